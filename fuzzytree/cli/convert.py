@@ -12,11 +12,9 @@ import click
 import msgspec
 
 from fuzzytree.cli.console import (
-    FullResultOptions,
     answer_bytes,
     answer_json,
     argument,
-    flag,
     option,
     progress_bar,
     say,
@@ -29,31 +27,25 @@ from fuzzytree.cli.console import (
     wrong_options,
 )
 from fuzzytree.cli.representation import (
-    as_option,
-    conjunction_option,
-    terms_option,
+    WritingOptions,
     wanted_format,
 )
 from fuzzytree.errors import LossError
 from fuzzytree.files import LIMIT, write_atomically
 from fuzzytree.model import (
-    Conjunction,
     Document,
     Format,
-    Kind,
-    ModelKind,
     Reading,
     Written,
 )
 
 if TYPE_CHECKING:
     from fuzzytree.checking import Proof
-    from fuzzytree.cli.export import ExportOptions
     from fuzzytree.model import Option
     from fuzzytree.numerics import Certificate
 
 
-class ConvertOptions(FullResultOptions):
+class ConvertOptions(WritingOptions):
     """The arguments and options of the verb."""
 
     source: str = argument("IN")
@@ -61,10 +53,6 @@ class ConvertOptions(FullResultOptions):
     read_as: str | None = option(
         "--from FORMAT", "Format of IN; from its suffix by default."
     )
-    to: str | None = option("--to FORMAT", "Format of OUT; from its suffix by default.")
-    representation: ModelKind | None = as_option
-    kind: Kind | None = terms_option
-    conjunction: Conjunction | None = conjunction_option
     dialect: str | None = option("--dialect NAME", "Dialect of the format of OUT.")
     tolerance: str | None = option(
         "--tolerance NUMBER", "Largest error of a degree where a curve becomes points."
@@ -72,9 +60,6 @@ class ConvertOptions(FullResultOptions):
     settings: Sequence[str] = several(
         "--set NAME=VALUE",
         "Option of the writer (repeat); `fuzzytree formats --format NAME` lists them.",
-    )
-    allow_loss: bool = flag(
-        "--allow-loss", "Write the file although the conversion loses information."
     )
 
 
@@ -145,7 +130,7 @@ def carry(
     source: str,
     read_as: str,
     form: Format,
-    chosen: ConvertOptions | ExportOptions,
+    chosen: WritingOptions,
     *,
     options: Mapping[str, Option],
     notes: Sequence[tuple[str, str, str]] = (),
@@ -166,13 +151,7 @@ def carry(
     from fuzzytree.cli.representation import represented
     from fuzzytree.model import kind_of, loss_text
 
-    model = represented(
-        found.model,
-        form,
-        representation=chosen.representation,
-        kind=chosen.kind,
-        conjunction=chosen.conjunction,
-    )
+    model = represented(found.model, form, chosen)
     facts: dict[str, object] = {
         "read": {
             "file": source,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import click
 
 from fuzzytree.cli.console import (
-    FullResultOptions,
     argument,
     flag,
     option,
@@ -14,27 +13,18 @@ from fuzzytree.cli.console import (
 )
 from fuzzytree.cli.convert import carry, read_source
 from fuzzytree.cli.representation import (
-    as_option,
-    conjunction_option,
-    terms_option,
+    WritingOptions,
     wanted_format,
 )
-from fuzzytree.model import Conjunction, Kind, ModelKind
 
 
-class ExportOptions(FullResultOptions):
+class ExportOptions(WritingOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
     output: str = option(
         "-o --output FILE", "File to write; `-` is stdout.", required=True
     )
-    to: str | None = option(
-        "--to FORMAT", "Format of FILE; from its suffix by default."
-    )
-    representation: ModelKind | None = as_option
-    kind: Kind | None = terms_option
-    conjunction: Conjunction | None = conjunction_option
     dtype: str | None = option(
         "--dtype",
         "onnx: number type of the degrees.",
@@ -58,9 +48,6 @@ class ExportOptions(FullResultOptions):
         "--readable", "onnx: write a node with a name for each step of rules."
     )
     plain: bool = flag("--plain", "onnx: write a tree without operators of ai.onnx.ml.")
-    allow_loss: bool = flag(
-        "--allow-loss", "Write the file although the format loses information."
-    )
 
 
 @click.command("export", short_help="Write a model in another format.")

@@ -14,7 +14,6 @@ import msgspec
 
 from fuzzytree.cli.collect import STATE
 from fuzzytree.cli.console import (
-    FullResultOptions,
     answer_bytes,
     answer_json,
     argument,
@@ -31,15 +30,13 @@ from fuzzytree.cli.console import (
 )
 from fuzzytree.cli.convert import next_check
 from fuzzytree.cli.representation import (
-    as_option,
-    conjunction_option,
+    RepresentationOptions,
     represented,
-    terms_option,
     wanted_format,
 )
 from fuzzytree.errors import TableError
 from fuzzytree.files import check_place, read_bounded, write_atomically
-from fuzzytree.model import Conjunction, Document, Format, Kind, ModelKind, printable
+from fuzzytree.model import Document, Format, printable
 
 if TYPE_CHECKING:
     from fuzzytree.api import Accuracy, LeafCounts, Summary
@@ -52,7 +49,7 @@ Lines = list[tuple[str, str, str]]
 Progress = Callable[[str, float], None]
 
 
-class LearnOptions(FullResultOptions):
+class LearnOptions(RepresentationOptions):
     """The arguments and options of the verb."""
 
     tables: Sequence[str] = argument("TABLE", nargs=-1, required=True)
@@ -68,9 +65,6 @@ class LearnOptions(FullResultOptions):
     )
     ignore: Sequence[str] = ignore_option
     units: Sequence[str] = several("--unit COLUMN=UNIT", "Unit of a column (repeat).")
-    representation: ModelKind | None = as_option
-    kind: Kind | None = terms_option
-    conjunction: Conjunction | None = conjunction_option
     no_test: bool = flag(
         "--no-test", "Learn without measuring the cross-validated accuracy."
     )
@@ -265,13 +259,7 @@ def _write(
     is_silent = options.quiet or options.output == "-"
     width = max(map(len, (options.output, *(thing for _, thing, _ in rows))))
     say_rows(*rows, width=width, quiet=is_silent)
-    model = represented(
-        tree,
-        form,
-        representation=options.representation,
-        kind=options.kind,
-        conjunction=options.conjunction,
-    )
+    model = represented(tree, form, options)
     content = export(model, form.name).content
     if options.output == "-":
         answer_bytes(content)

@@ -6,26 +6,42 @@ from pathlib import Path
 
 import click
 
-from fuzzytree.cli.console import option
+from fuzzytree.cli.console import FullResultOptions, flag, option
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import Conjunction, Document, Format, Kind, ModelKind
 
-as_option = option(
-    "--as",
-    "Representation to write: the tree, its rules, or the equivalent system.",
-    choices=["tree", "rules", "system"],
-)
-terms_option = option(
-    "--terms",
-    "Rules that equal the tree (the default), or those of the paper.",
-    choices=["relative", "raw"],
-)
-conjunction_option = option(
-    "--conjunction",
-    "AND operator of the rules; minimum by default.",
-    choices=["minimum", "product"],
-)
+
+class RepresentationOptions(FullResultOptions):
+    """The options that say what of a model is written."""
+
+    representation: ModelKind | None = option(
+        "--as",
+        "Representation to write: the tree, its rules, or the equivalent system.",
+        choices=["tree", "rules", "system"],
+    )
+    kind: Kind | None = option(
+        "--terms",
+        "Rules that equal the tree (the default), or those of the paper.",
+        choices=["relative", "raw"],
+    )
+    conjunction: Conjunction | None = option(
+        "--conjunction",
+        "AND operator of the rules; minimum by default.",
+        choices=["minimum", "product"],
+    )
+
+
+class WritingOptions(RepresentationOptions):
+    """The options of a verb that writes a model in another format."""
+
+    output: str
+    to: str | None = option(
+        "--to FORMAT", "Format of the file; from its suffix by default."
+    )
+    allow_loss: bool = flag(
+        "--allow-loss", "Write the file although the format loses information."
+    )
 
 
 def wanted_format(output: str, to: str | None) -> Format:
@@ -47,12 +63,7 @@ def wanted_format(output: str, to: str | None) -> Format:
 
 
 def represented(
-    model: Document,
-    form: Format,
-    *,
-    representation: ModelKind | None,
-    kind: Kind | None,
-    conjunction: Conjunction | None,
+    model: Document, form: Format, options: RepresentationOptions
 ) -> Document:
     """Return a model in the wanted representation; see `converting.formed`.
 
@@ -62,13 +73,14 @@ def represented(
     """
     from fuzzytree.checking import formed
 
-    if representation == "tree" and (kind is not None or conjunction is not None):
+    kind, conjunction = options.kind, options.conjunction
+    if options.representation == "tree" and (kind or conjunction):
         raise click.UsageError("--terms and --conjunction are for --as rules")
     try:
         return formed(
             model,
             form,
-            representation=representation,
+            representation=options.representation,
             kind=kind,
             conjunction=conjunction,
         )
