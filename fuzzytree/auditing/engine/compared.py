@@ -10,6 +10,7 @@ where inputs are shared, `always` still does.
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Final, Literal, NamedTuple
@@ -21,14 +22,15 @@ from fuzzytree.auditing.engine.bounding import highest_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import contains
 from fuzzytree.auditing.engine.levels import (
-    MOST_CHOICES,
     LevelAxis,
     Levels,
     Propositions,
     Sides,
-    at_most,
+    Tries,
     bits,
+    first_accepted,
     levels_of,
+    runs,
 )
 from fuzzytree.auditing.engine.lines import Lines, at_knots, together
 from fuzzytree.auditing.engine.measures import Bounds, largest_gap
@@ -43,7 +45,7 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
     point_of,
 )
-from fuzzytree.auditing.engine.witnesses import AxisStretch, point_with
+from fuzzytree.auditing.engine.witnesses import AxisStretch
 from fuzzytree.model import BoolArray, FloatArray, checkpoint
 from fuzzytree.numerics import outwards
 
@@ -503,16 +505,13 @@ class RulePairs:
             every: list[list[tuple[AxisStretch, int]]] = []
             for axis in self.levels.axes:
                 cells = axis.cells(goal, goal, is_sure=is_sure, has_points=True)
-                fits = [c.part for c in cells if not mine & ~c.reach]
-                every.append([(part, 0) for part in _runs(fits)])
-            count = at_most(MOST_CHOICES, clock)
-            for wanted in self.levels.selections(every, 0, clock, count):
-                is_never = False
-                point = point_with(self.base, wanted)
-                found = None if point is None else self._checked(rules, point, level)
-                if found is not None:
-                    return found, False
-                break
+                every.append(runs((c.part, 0) for c in cells if not mine & ~c.reach))
+            some = self.levels.selections(every, 0, Tries(clock))
+            accept = functools.partial(self._checked, rules, level=level)
+            found, is_any = first_accepted(self.base, itertools.islice(some, 1), accept)
+            if found is not None:
+                return found, False
+            is_never &= not is_any
             if self.levels.is_exact:
                 break
         return None, is_never
@@ -552,19 +551,6 @@ class RulePairs:
             return JointMaximum(Bounds(Fraction(found.low), most), found)
         low = _reached(witness)
         return JointMaximum(Bounds(low, max(low, most)), witness)
-
-
-def _runs(parts: list[AxisStretch]) -> Iterator[AxisStretch]:
-    """Yield neighbouring parts as one, the widest first."""
-    result: list[AxisStretch] = []
-    for part in parts:
-        if result and result[-1].high == part.low:
-            # Both ends may be left out, as a limit is not always reached.
-            result.append(AxisStretch(result.pop().low, part.high))
-        else:
-            result.append(part)
-    result.sort(key=lambda part: part.low - part.high)
-    yield from result
 
 
 def _reached(witness: Witness) -> Fraction:
@@ -672,8 +658,8 @@ def _positive(lines: Lines) -> list[AxisStretch]:
     """Return the parts on which a function is above 0, as long as they can be."""
     if len(lines.x) == 1:
         return [AxisStretch(lines.x[0], lines.x[0], is_open=False)] * (lines.at[0] > 0)
-    every = (AxisStretch(a, b) for a, b, p, q in lines.pieces() if p > 0 or q > 0)
-    return [*_runs([*every])]
+    every = ((AxisStretch(a, b), 0) for a, b, p, q in lines.pieces() if p > 0 or q > 0)
+    return [part for part, _ in runs(every)]
 
 
 def _ratio_parts(f: Lines, g: Lines) -> Iterator[tuple[AxisStretch, Fraction]]:

@@ -44,9 +44,7 @@ from fuzzytree.auditing.engine.witnesses import AxisStretch, coupled, point_with
 from fuzzytree.model import checkpoint
 from fuzzytree.numerics import outwards
 
-MOST_CHOICES: Final = 2_000
-"""So many values for axes that share inputs are tried for one question."""
-
+_MOST_CHOICES: Final = 2_000  # tried for axes that share inputs, for one question
 _DEEPEST: Final = 4  # halvings of levels for axes that share inputs
 _DEEPEST_ENCLOSED: Final = 7  # where degrees are enclosed
 _TRIES: Final = 16  # levels between two critical ones
@@ -400,6 +398,29 @@ def _serves(one: Cell, other: Cell) -> bool:
 # --- all axes
 
 
+class Tries:
+    """How many values of axes that share inputs were tried for one question.
+
+    Attributes:
+        used: How many.
+        clock: When no more are.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self.used, self.clock = 0, clock
+
+    def count(self) -> None:
+        """Count one more.
+
+        Raises:
+            OutOfTimeError: If they are too many, or the clock is over.
+        """
+        self.clock.check()
+        self.used += 1
+        if self.used > _MOST_CHOICES:
+            raise OutOfTimeError
+
+
 class Sides(NamedTuple):
     """What is to be kept apart: rules, as bits."""
 
@@ -426,8 +447,7 @@ class Levels:
 
     def __init__(self, base: Arrangement, axes: Sequence[LevelAxis]) -> None:
         self.base, self.axes = base, tuple(axes)
-        self.groups = coupled(base)
-        self.joined = sorted({axis for group in self.groups for axis in group})
+        self.joined = sorted({axis for group in coupled(base) for axis in group})
         self.is_exact = all(axis.is_exact for axis in self.axes)
 
     @functools.cached_property
@@ -516,34 +536,13 @@ class Levels:
         low, high = ZERO, ONE
         for _ in range(20):
             middle = (low + high) / 2
-            if self.chosen(sides, middle, middle, clock, is_sure=is_sure) is None:
+            every = self._parts(sides, middle, middle, is_sure=is_sure)
+            masks = [{mask for _, mask in parts} for parts in every]
+            if joint_choice(masks, sides.rivals, clock) is None:
                 low = middle
             else:
                 high = middle
         return high if is_sure else low
-
-    def chosen(
-        self,
-        sides: Sides,
-        reached: Fraction,
-        kept: Fraction,
-        clock: Clock,
-        *,
-        is_sure: bool = False,
-        keeps_zero: bool = False,
-    ) -> dict[int, AxisStretch] | None:
-        """Return parts of the axes that keep rules apart, as if axes were free."""
-        every = self._parts(
-            sides, reached, kept, is_sure=is_sure, keeps_zero=keeps_zero
-        )
-        masks = [{mask for _, mask in parts} for parts in every]
-        found = joint_choice(masks, sides.rivals, clock)
-        if found is None:
-            return None
-        return {
-            axis: _widest(parts, mask)
-            for axis, (parts, mask) in enumerate(zip(every, found, strict=True))
-        }
 
     def _parts(
         self,
@@ -552,25 +551,14 @@ class Levels:
         kept: Fraction,
         *,
         is_sure: bool = False,
-        keeps_zero: bool = False,
     ) -> list[list[tuple[AxisStretch, int]]]:
         """Return for each axis its parts, each with the rivals kept below there."""
         result: list[list[tuple[AxisStretch, int]]] = []
         for axis in self.axes:
-            cells = axis.cells(reached, kept, is_sure=is_sure, has_points=keeps_zero)
+            cells = axis.cells(reached, kept, is_sure=is_sure)
             wrong = 0 if reached == kept and self.is_exact else self._same(axis, sides)
-            result.append(
-                [
-                    (
-                        cell.part,
-                        (cell.below | (cell.level if keeps_zero else 0))
-                        & sides.rivals
-                        & ~wrong,
-                    )
-                    for cell in cells
-                    if _keeps(cell, sides)
-                ]
-            )
+            goal = sides.rivals & ~wrong
+            result.append([(c.part, c.below & goal) for c in cells if _keeps(c, sides)])
         return result
 
     def _same(self, axis: LevelAxis, sides: Sides) -> int:
@@ -598,7 +586,7 @@ class Levels:
             ]
             # Those with an interior are tried first: a point there has others around.
             whole = AxisStretch(*axis.ends, is_open=False)
-            every.append([(whole, 0), *points, *_runs(inner)])
+            every.append([(whole, 0), *points, *runs(inner)])
         return every
 
     # --- points
@@ -607,14 +595,13 @@ class Levels:
         self,
         every: Sequence[Sequence[tuple[AxisStretch, int]]],
         goal: int,
-        clock: Clock,
-        count: Callable[[], None],
+        tries: Tries,
         fixed: Mapping[int, AxisStretch] | None = None,
     ) -> Iterator[dict[int, AxisStretch]]:
         """Yield parts of the axes that some point has and that contain a goal.
 
-        `every`: the parts of each axis; `count`: called before inequalities are solved;
-        it may raise; `fixed`: the parts of axes that are not to be chosen.
+        `every`: the parts of each axis; `fixed`: those of axes that are not to be
+        chosen.
         """
         fixed = dict(fixed or {})
         free = [a for a in range(len(every)) if a not in self.joined and a not in fixed]
@@ -630,11 +617,11 @@ class Levels:
             if (covered | reach[place]) & goal != goal:
                 continue
             if self.joined and wanted:
-                count()
+                tries.count()
                 if point_with(self.base, wanted) is None:
                     continue
             if place == len(joined):
-                found = joint_choice(masks, goal & ~covered, clock)
+                found = joint_choice(masks, goal & ~covered, tries.clock)
                 if found is not None:
                     rest = zip(free, found, strict=True)
                     yield wanted | {a: _widest(every[a], mask) for a, mask in rest}
@@ -649,44 +636,46 @@ class Levels:
         self,
         sides: Sides,
         levels: tuple[Fraction, Fraction],
-        clock: Clock,
-        count: Callable[[], None],
-        accept: Callable[[Point], Found | None],
-    ) -> tuple[Found | None, bool]:
+        tries: Tries,
+        accept: Callable[[Point], T | None],
+    ) -> tuple[T | None, bool]:
         """Return what a point keeps apart at some of the levels, and if it is open.
 
         `accept`: returns what a point shows, None if it shows nothing.
         """
+        is_plain = self.is_exact and not self.joined
         deepest = _DEEPEST if self.is_exact else _DEEPEST_ENCLOSED
-        todo = [(*levels, deepest if self.joined or not self.is_exact else 0)]
+        todo = [(*levels, 0 if is_plain else deepest)]
         is_open = False
         while todo:
             low, high, depth = todo.pop()
             middle = (low + high) / 2
-            tries = [(middle, middle)]
-            if self.joined or not self.is_exact:
-                tries = [(low, high), (middle, middle)]
-            is_possible = True
-            for reached, kept in tries:
-                parts = self._parts(sides, reached, kept)
-                if reached != kept:
-                    parts = [[(_closed(p), m) for p, m in of] for of in parts]
-                some = self.selections(parts, sides.rivals, clock, count)
-                wanted = next(some, None)
-                if wanted is None:
-                    is_possible = (reached, kept) != (low, high)
-                    if not is_possible:
-                        break
-                    continue
-                point = point_with(self.base, wanted)
-                found = None if point is None else accept(point)
-                if found is not None:
-                    return found, False
-            if is_possible and depth:
+            found, may_be = None, True
+            if not is_plain:  # is there anything, at any of the levels?
+                found, may_be = self._at(sides, (low, high), tries, accept)
+            if found is None and may_be:
+                found, is_there = self._at(sides, (middle, middle), tries, accept)
+                may_be = is_there or not is_plain
+            if found is not None:
+                return found, False
+            if may_be and depth:
                 todo += [(low, middle, depth - 1), (middle, high, depth - 1)]
-            elif is_possible:
-                is_open = True
+            is_open |= may_be and not depth
         return None, is_open
+
+    def _at(
+        self,
+        sides: Sides,
+        between: tuple[Fraction, Fraction],
+        tries: Tries,
+        accept: Callable[[Point], T | None],
+    ) -> tuple[T | None, bool]:
+        """Return what one point shows at a level, and whether any parts do."""
+        parts = self._parts(sides, *between)
+        if between[0] != between[1]:
+            parts = [[(_closed(p), m) for p, m in of] for of in parts]
+        some = self.selections(parts, sides.rivals, tries)
+        return first_accepted(self.base, itertools.islice(some, 1), accept)
 
     # --- ties
 
@@ -772,10 +761,10 @@ class Levels:
             ]
             for a in self.axes
         ]
-        count = at_most(MOST_CHOICES, clock)
+        tries = Tries(clock)
         for point in points:
             goal = sides.rivals & ~done
-            yield from self.selections(parts, goal, clock, count, {number: point.part})
+            yield from self.selections(parts, goal, tries, {number: point.part})
 
     def _flat(
         self, ours: Sequence[int], strict: int, weak: int, clock: Clock
@@ -806,8 +795,8 @@ class Levels:
                 every.append(parts)
             masks = [{mask for _, mask in parts} for parts in every]
             if joint_choice(masks, goal, clock) is not None:
-                count = at_most(MOST_CHOICES, clock)
-                yield from self.selections(every, goal, clock, count)
+                tries = Tries(clock)
+                yield from self.selections(every, goal, tries)
 
     def pinned_by_curve(
         self, ours: Sequence[int], strict: int, weak: int, clock: Clock
@@ -818,7 +807,7 @@ class Levels:
         values, the other parts hold for sure.
         """
         mine = _union(1 << one for one in ours)
-        count = at_most(MOST_CHOICES, clock)
+        tries = Tries(clock)
         for number, axis in enumerate(self.axes):
             low, high = axis.ends
             shared = set.intersection(*(set(axis.propositions[one]) for one in ours))
@@ -840,7 +829,7 @@ class Levels:
                     sides = Sides(mine, goal)
                     parts = self._parts(sides, most, least, is_sure=True)
                     fixed = {number: AxisStretch(x, x, is_open=False)}
-                    yield from self.selections(parts, goal, clock, count, fixed)
+                    yield from self.selections(parts, goal, tries, fixed)
         yield from self._flat(ours, strict, weak, clock)
 
     # --- boxes around points
@@ -892,10 +881,6 @@ class Levels:
         return tuple(spans)
 
 
-Found = object
-"""What `Levels.search` returns of a point."""
-
-
 @functools.lru_cache(maxsize=16)
 def levels_of(base: Arrangement) -> Levels:
     """Return the rules of an arrangement at levels; worked out once for each."""
@@ -917,16 +902,24 @@ def _level_axis(
     return LevelAxis(ends, is_open, elements, axis.propositions)
 
 
-def at_most(calls: int, clock: Clock) -> Callable[[], None]:
-    """Return what raises OutOfTimeError when called too often, or too late."""
-    left = iter(range(calls))
+def first_accepted(
+    base: Arrangement,
+    selections: Iterable[Mapping[int, AxisStretch]],
+    accept: Callable[[Point], T | None],
+) -> tuple[T | None, bool]:
+    """Return what the first point that is accepted shows, and if any parts were tried.
 
-    def count() -> None:
-        clock.check()
-        if next(left, None) is None:
-            raise OutOfTimeError
-
-    return count
+    `selections`: parts of the axes; `accept`: returns what a point of them shows, None
+    if it shows nothing.
+    """
+    is_any = False
+    for wanted in selections:
+        is_any = True
+        point = point_with(base, wanted)
+        found = None if point is None else accept(point)
+        if found is not None:
+            return found, True
+    return None, is_any
 
 
 def _beside(known: Sequence[T], place: int) -> Sequence[T]:
@@ -960,7 +953,7 @@ def _closed(part: AxisStretch) -> AxisStretch:
     return part._replace(is_open=False)
 
 
-def _runs(
+def runs(
     parts: Iterable[tuple[AxisStretch, int]],
 ) -> list[tuple[AxisStretch, int]]:
     """Return neighbouring parts with the same mask as one."""

@@ -24,7 +24,6 @@ from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     composed,
     derivative,
-    difference,
     roots,
     value_at,
 )
@@ -201,18 +200,6 @@ class RuleCurve(NamedTuple):
         """Return the exact limit of the degree from the right."""
         result = piece_at(pieces(self.shape), x, is_after=True).degree(x)
         return 1 - result if self.is_complement else result
-
-    def pieces(self) -> tuple[tuple[PolynomialPiece, Polynomial], ...]:
-        """Return the pieces of the shape, each with its own polynomial on it."""
-        return tuple(
-            (
-                piece,
-                difference((ONE,), piece.polynomial)
-                if self.is_complement
-                else piece.polynomial,
-            )
-            for piece in pieces(self.shape)
-        )
 
 
 # --- bounds of degrees on whole intervals, by doubles

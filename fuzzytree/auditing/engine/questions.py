@@ -7,7 +7,7 @@ that is claimed was evaluated in fractions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from fractions import Fraction
 from functools import partial
 from typing import Final, NamedTuple
@@ -27,11 +27,11 @@ from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.compared import RulePairs
 from fuzzytree.auditing.engine.domain import Domain, Point, contains
 from fuzzytree.auditing.engine.levels import (
-    MOST_CHOICES,
     Levels,
     Sides,
-    at_most,
+    Tries,
     bits,
+    first_accepted,
     levels_of,
 )
 from fuzzytree.auditing.engine.linear import simple
@@ -123,22 +123,21 @@ class _Question(NamedTuple):
 def _searched(question: _Question, of: str, clock: Clock) -> State:
     """Return the answer by levels; a bracket of what the text names if it is open."""
     base = question.base
-    levels = levels_of(base)
-    tried = [0]
+    levels, tries = levels_of(base), Tries(clock)
     try:
         if levels.joined:
             found = _led(question)
             if found is not None:
                 return found
-        witness, is_open = _at_levels(question, levels, tried, clock)
+        witness, is_open = _at_levels(question, levels, tries)
     except OutOfTimeError:
-        return Bracket(of, 0.0, 1.0, f"the budget was spent: {_how(levels, tried)}")
-    if isinstance(witness, Witness):
+        return Bracket(of, 0.0, 1.0, f"the budget was spent: {_how(levels, tries)}")
+    if witness is not None:
         return witness
     if is_open:
         why = _DEPENDENT if levels.is_exact else _ENCLOSED
-        return Bracket(of, 0.0, 1.0, f"{why}: {_how(levels, tried)}")
-    return Proved(_how(levels, tried))
+        return Bracket(of, 0.0, 1.0, f"{why}: {_how(levels, tries)}")
+    return Proved(_how(levels, tries))
 
 
 def _led(question: _Question) -> Witness | None:
@@ -152,25 +151,18 @@ def _led(question: _Question) -> Witness | None:
 
 
 def _at_levels(
-    question: _Question, levels: Levels, tried: list[int], clock: Clock
-) -> tuple[object, bool]:
+    question: _Question, levels: Levels, tries: Tries
+) -> tuple[Witness | None, bool]:
     sides, is_open = question.sides, False
-
-    def count() -> None:
-        clock.check()
-        tried[0] += 1
-        if tried[0] > MOST_CHOICES:
-            raise OutOfTimeError
-
     if not levels.axes:
         return question.accept(_middle(question.base)), False
     ranges: Iterable[tuple[Fraction, Fraction]] = [(ZERO, ONE)]
     if question.ceiling is not None:
         ranges = [(question.ceiling, question.ceiling)]
     elif levels.is_exact:
-        ranges = levels.apart(sides, clock)
+        ranges = levels.apart(sides, tries.clock)
     for ends in ranges:
-        found, is_left = levels.search(sides, ends, clock, count, question.accept)
+        found, is_left = levels.search(sides, ends, tries, question.accept)
         if found is not None:
             return found, False
         is_open |= is_left
@@ -181,10 +173,12 @@ def _middle(base: Arrangement) -> Point:
     return point_with(base, {}) or {}
 
 
-def _how(levels: Levels, tried: Sequence[int]) -> str:
+def _how(levels: Levels, tries: Tries) -> str:
     axes = counted(len(levels.axes), "axis", "axes")
     text = f"{counted(len(levels.levels), 'level')} on {axes} visited"
-    return f"{text}, {counted(tried[0], 'choice')} of inputs" if tried[0] else text
+    if not tries.used:
+        return text
+    return f"{text}, {counted(tries.used, 'choice')} of inputs"
 
 
 def wins(
@@ -380,12 +374,11 @@ def uncovered(base: Arrangement, clock: Clock | None = None) -> State:
     name = "how many rules fire at least"
     try:
         for is_sure in (True, False):
-            point, is_open = _bare(base, levels, clock, is_sure=is_sure)
-            if point is not None:
-                found = _bare_witness(base, point)
-                if found is not None:
-                    return found
-            is_open |= point is not None
+            every = levels.zeros(is_sure=is_sure)
+            some = levels.selections(every, bits(_every(base)), Tries(clock))
+            found, is_open = first_accepted(base, some, partial(_bare_witness, base))
+            if found is not None:
+                return found
             if not is_sure and is_open and not levels.is_exact:
                 return below_by_boxes(base.rules, base.domain, 0, clock)
             if is_open and levels.is_exact:
@@ -394,21 +387,6 @@ def uncovered(base: Arrangement, clock: Clock | None = None) -> State:
         return Bracket(name, 0.0, 1.0, "the budget was spent")
     axes = counted(len(levels.axes), "axis", "axes")
     return Proved(f"the parts of {axes} where rules are 0 were visited")
-
-
-def _bare(
-    base: Arrangement, levels: Levels, clock: Clock, *, is_sure: bool
-) -> tuple[Point | None, bool]:
-    """Return a point at which all rules are 0, and whether there may be another."""
-    every = levels.zeros(is_sure=is_sure)
-    count = at_most(MOST_CHOICES, clock)
-    is_open = False
-    for wanted in levels.selections(every, bits(_every(base)), clock, count):
-        is_open = True
-        point = point_with(base, wanted)
-        if point is not None:
-            return point, is_open
-    return None, is_open
 
 
 def _bare_witness(base: Arrangement, point: Point) -> Witness | None:
@@ -516,12 +494,11 @@ def _tied(question: _TieQuestion, clock: Clock) -> State:
             return question.open(_ENCLOSED) if is_left else tied
         ours = [n - 1 for n in question.ours]
         strict, weak = bits(question.strict), bits(question.weak)
-        for wanted in levels.tied(ours, strict, weak, clock):
-            point = point_with(base, wanted)
-            found = None if point is None else question.accept(point)
-            if found is not None:
-                return found
-            is_open = True
+        some = levels.tied(ours, strict, weak, clock)
+        found, is_any = first_accepted(base, some, question.accept)
+        if found is not None:
+            return found
+        is_open |= is_any
     except OutOfTimeError:
         return question.open("the budget was spent")
     if is_open or (levels.joined and have_one_direction(base)):
@@ -605,11 +582,10 @@ def _tied_enclosed(question: _TieQuestion, clock: Clock) -> State:
     base, levels = question.base, levels_of(question.base)
     ours = [n - 1 for n in question.ours]
     strict, weak = bits(question.strict), bits(question.weak)
-    for wanted in levels.pinned_by_curve(ours, strict, weak, clock):
-        point = point_with(base, wanted)
-        found = None if point is None else question.accept(point)
-        if found is not None:
-            return found
+    some = levels.pinned_by_curve(ours, strict, weak, clock)
+    found, _ = first_accepted(base, some, question.accept)
+    if found is not None:
+        return found
     # A single rule ties with any that may be as strong; it was found not to win.
     others = ours[1:] or [n - 1 for n in question.weak]
     if not may_tie(base)[ours[0], others].any():
