@@ -452,6 +452,9 @@ def _witness(case: Case, report: Report, answer: Answer, state: Witness) -> None
     is_same = answer.region in ((), state.region)
     require(is_same, "the answer's region is not that of its witness")
     require(bool(state.claims), "a witness of which nothing is claimed")
+    levels = [claim.rules for claim in state.claims if claim.kind == "strength"]
+    is_own = not levels or not answer.rules or {*levels[0]} <= {*answer.rules}
+    require(is_own, "the strength of another rule is claimed")
     check_spans(case, state.region)
     for span in state.region:
         x = case.model.variables[span.variable].at(point)
@@ -479,24 +482,24 @@ def _shows_win(case: Case, answer: Answer, state: Witness) -> None:
     if answer.message == "FT101.fires":
         rivals = set()
     beats = [c for c in state.claims if (c.kind, c.rules) == ("beats", (number,))]
-    is_all = any(rivals <= {*claim.rivals} for claim in beats)
+    is_all = any(rivals == {*claim.rivals} for claim in beats)
     require(is_all, "it is not claimed that the rule beats all these others")
 
 
 def _shows_tie(case: Case, answer: Answer, state: Witness) -> None:
     """Check that a claim compares rules that tie with all others."""
-    met = [c for c in state.claims if c.kind == "ties" and answer.rules[0] in c.rules]
-    require(bool(met), "it is not claimed that they tie")
+    met = [c for c in state.claims if c.kind == "ties"]
+    is_all = any(
+        {*answer.rules} <= {*c.rules} and {*c.rules, *c.rivals} == {*case.numbers}
+        for c in met
+    )
+    require(is_all, "it is not claimed that they tie above all others")
     if answer.code == "FT202":
-        is_all = any(
-            {*answer.rules} <= {*c.rules} and {*c.rules, *c.rivals} == {*case.numbers}
-            for c in met
-        )
-        require(is_all, "it is not claimed that the two tie above all others")
         require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
 
 
 def _shows_lead(case: Case, answer: Answer, state: Witness) -> None:
+    _shows_win(case, answer, state)
     every = strengths(case.rules, case.point_of(state.point))
     number = answer.rules[0]
     rivals = [every[n - 1][1] for n in case.rivals(number)]

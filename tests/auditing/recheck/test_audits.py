@@ -44,8 +44,8 @@ FREE = {
     r"answers\.state\.(how|of|why|reason)": "how it was made, in words",
     r"answers\.state\.(low|high|hits|rows|confidence)": "of samples and brackets",
     r"answers\.state\.claims|answers\.(state\.)?region(\..*)?": "it says less",
-    r"answers\.state\.claims\.(rules|rivals)": "true of other rules as well",
-    r"answers": "of several gaps, or what was declined",
+    r"answers (FT301\.(gap|weak)|FTD|.*declined).*": "of several gaps, or declined",
+    r"answers .*\.others": "without what is not found it says less",
     r"answers\.id": "it names a finding for baselines, and nothing else",
     r"answers\.places": "it says less",
     r"answers\.measures\.name": "of a bracket, or of the shape of a term",
@@ -112,6 +112,10 @@ def missed(text: bytes, content: bytes, seed: int, many: int) -> list[str]:
         way, edited = chance.choice(every[name]), json.loads(text)
         edit(edited, way, chance)
         edited["digest"] = digest_of(edited)
+        if way == ("answers",):
+            rest = [one["id"] for one in edited["answers"]]
+            gone = next(one for one in facts["answers"] if one["id"] not in rest)
+            name += f" {gone['message']}"
         is_free = any(re.fullmatch(pattern, name) for pattern in FREE)
         if not wrong_with(edited, content) and not is_free:
             result.append(f"{way}: {name}")
