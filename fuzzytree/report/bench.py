@@ -30,7 +30,6 @@ _UNBEATEN = (
 )
 _MOST_UNBEATEN = 18  # rows of the short table
 Timed = dict[str, tuple[Point, Timing]]
-"""What was measured at one number of rows and threads, by name."""
 
 _WIDTH = 96  # of a line of words
 _LEGEND = (
@@ -80,20 +79,14 @@ def _more(title: str, shown: Sequence[str], rest: int) -> Iterator[str]:
 
 def _unbeaten(study: Study) -> Iterator[tuple[str, ...]]:
     """Yield the fastest unbeaten candidate of each question and number of rows."""
-    timed = {
-        (point.name, one.rows, one.threads): (point, one)
-        for point in study.points
-        for one in point.timings
-    }
     for front in study.fronts:
-        key = (front.rows, front.threads)
-        members = [timed[name, *key] for name in front.names if (name, *key) in timed]
+        here = timed_of(study, front.rows, front.threads)
+        members = [here[name] for name in front.names if name in here]
         if not members:
             continue
         point, timing = min(
             members, key=lambda one: (one[0].kind == "variant", one[1].median_ns)
         )
-        here = {name: one for (name, *size), one in timed.items() if (*size,) == key}
         time, _, speed, _ = _time_cells(timing, here, front.question)
         yield (
             front.question,
@@ -108,7 +101,7 @@ def _unbeaten(study: Study) -> Iterator[tuple[str, ...]]:
 
 def _tables(study: Study, *, is_full: bool) -> Iterator[str]:
     yield from aligned(machine_rows(study.machine))
-    for rows, threads in _sizes(study.points):
+    for rows, threads in sizes(study.points):
         yield ""
         yield f"{rows:,} row{'' if rows == 1 else 's'}, {counted(threads, 'thread')}"
         table = [*_table(study, rows, threads, is_full=is_full)]
@@ -138,9 +131,20 @@ def machine_rows(machine: Machine) -> Iterator[tuple[str, str]]:
         yield "load", load
 
 
-def _sizes(points: Iterable[Point]) -> list[tuple[int, int]]:
+def sizes(points: Iterable[Point]) -> list[tuple[int, int]]:
+    """Return the numbers of rows and threads that were measured."""
     sizes = {(one.rows, one.threads) for point in points for one in point.timings}
     return sorted(sizes)
+
+
+def timed_of(study: Study, rows: int, threads: int) -> Timed:
+    """Return what was measured at one number of rows and threads, by name."""
+    return {
+        point.name: (point, timing)
+        for point in study.points
+        for timing in point.timings
+        if (timing.rows, timing.threads) == (rows, threads)
+    }
 
 
 def _table(
@@ -148,12 +152,7 @@ def _table(
 ) -> Iterator[tuple[str, ...]]:
     """Yield the cells of one table, question by question, the fastest first."""
     yield ("", *_HEAD)
-    timed: Timed = {
-        point.name: (point, timing)
-        for point in study.points
-        for timing in point.timings
-        if (timing.rows, timing.threads) == (rows, threads)
-    }
+    timed = timed_of(study, rows, threads)
     questions: dict[Question, None] = {}
     for point, timing in timed.values():
         if point.kind == "floor":
@@ -161,7 +160,7 @@ def _table(
         else:
             questions[point.question] = None
     for question in questions:
-        best = _best(study, question, rows, threads)
+        best = unbeaten(study, question, rows, threads)
         yield from _rows(question, timed, best, is_full=is_full)
 
 
@@ -188,10 +187,12 @@ def _rows(
         yield (f"  and {counted(beaten, 'variant')} that something beats",)
 
 
-def _best(study: Study, question: Question, rows: int, threads: int) -> Sequence[str]:
-    key = (question, rows, threads)
+def unbeaten(
+    study: Study, question: Question, rows: int, threads: int
+) -> Sequence[str]:
+    """Return the names of what nothing beats in both run time and error."""
     for front in study.fronts:
-        if (front.question, front.rows, front.threads) == key:
+        if (front.question, front.rows, front.threads) == (question, rows, threads):
             return front.names
     return ()
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from fuzzytree.benchmarking import Kind, Point, Question, Study, Timing, error_of
+from fuzzytree.report.bench import sizes, timed_of, unbeaten
 from fuzzytree.report.drawing import LETTER, Scale, path_of
 from fuzzytree.report.markup import Markup, mark
 from fuzzytree.report.pictures import Picture, picture
@@ -139,12 +140,16 @@ def work_precision(study: Study, *, rows: int, threads: int = 1) -> Picture:
     Raises:
         ValueError: If nothing was measured with so many rows and threads.
     """
-    marks = [*marks_of(study, rows, threads)]
+    marks = marks_of(study, rows, threads)
     if not marks:
-        raise ValueError(_nothing_text(study, rows, threads))
+        known = ", ".join(f"{one} with {k}" for one, k in sizes(study.points))
+        raise ValueError(
+            f"nothing was measured with {rows} rows and {threads} threads; "
+            f"rows and threads in this study: {known or 'none'}"
+        )
     floors = [
         (point.name.removeprefix("floor: "), one.median_ns / one.rows)
-        for point, one in _timed(study, rows, threads)
+        for point, one in timed_of(study, rows, threads).values()
         if point.kind == "floor"
     ]
     panels = panels_of(marks, [time for _, time in floors])
@@ -173,17 +178,10 @@ def _look(question: Question) -> str:
     return question.replace(" ", "-")
 
 
-def marks_of(study: Study, rows: int, threads: int) -> Iterator[Mark]:
-    """Yield what is to be drawn, the front first, then by time."""
-    key = (rows, threads)
-    fronts = {
-        name
-        for front in study.fronts
-        if (front.rows, front.threads) == key
-        for name in front.names
-    }
+def marks_of(study: Study, rows: int, threads: int) -> list[Mark]:
+    """Return what is to be drawn, the front first, then by time."""
     marks: list[Mark] = []
-    for point, timing in _timed(study, rows, threads):
+    for point, timing in timed_of(study, rows, threads).values():
         if point.error is None or not point.error.rows:
             continue
         error = error_of(point)
@@ -191,26 +189,9 @@ def marks_of(study: Study, rows: int, threads: int) -> Iterator[Mark]:
         if point.question == "tree" or error is None:
             measure, error = "class", point.error.flips / point.error.rows
         height = error if error <= 1.0 else 1.0  # NaN and infinity are drawn at 1
-        marks.append(Mark(point, timing, measure, height, point.name in fronts))
-    yield from sorted(
-        marks, key=lambda m: (not m.is_front, m.nanoseconds, m.point.name)
-    )
-
-
-def _timed(study: Study, rows: int, threads: int) -> Iterator[tuple[Point, Timing]]:
-    for point in study.points:
-        for timing in point.timings:
-            if (timing.rows, timing.threads) == (rows, threads):
-                yield point, timing
-
-
-def _nothing_text(study: Study, rows: int, threads: int) -> str:
-    known = {(one.rows, one.threads) for point in study.points for one in point.timings}
-    text = ", ".join(f"{rows} with {threads}" for rows, threads in sorted(known))
-    return (
-        f"nothing was measured with {rows} rows and {threads} threads; "
-        f"rows and threads in this study: {text or 'none'}"
-    )
+        is_front = point.name in unbeaten(study, point.question, rows, threads)
+        marks.append(Mark(point, timing, measure, height, is_front))
+    return sorted(marks, key=lambda m: (not m.is_front, m.nanoseconds, m.point.name))
 
 
 def panels_of(marks: Sequence[Mark], floors: Sequence[float]) -> list[Panel]:

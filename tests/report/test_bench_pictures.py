@@ -62,7 +62,7 @@ def large(count: int) -> Study:
 
 
 def panels(made: Study) -> list[Panel]:
-    return panels_of([*marks_of(made, 1000, 1)], [])
+    return panels_of(marks_of(made, 1000, 1), [])
 
 
 def signs(made: Study) -> dict[str, list[dict[str, str]]]:
