@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Iterator, Sequence
-from typing import cast, get_args
+from collections.abc import Callable, Sequence
+from typing import Any, cast, get_args
 
 from fuzzytree.checking.comparing import strength_gap, unequal
 from fuzzytree.checking.equivalence import equivalence
@@ -17,11 +16,9 @@ from fuzzytree.model import (
     Format,
     FuzzyTree,
     Model,
-    Outcome,
-    RuleBase,
     Run,
-    Written,
     kind_of,
+    options_of,
 )
 from fuzzytree.runtimes import baseline, load_content, open_onnx
 from fuzzytree.semantics import forms
@@ -43,103 +40,72 @@ def roundtrips(
     trial = Trial("N9", _ADVICE, worst=0.0)
     for representation, form in forms(model).items():
         for one in formats:
+            title = f"{one.name}: {representation}"
             if kind_of(form) not in one.carries:
                 continue
             try:
-                for count, gap, fault in _tried(
-                    one, representation, form, values, trial.skipped
-                ):
-                    trial.add(count, fault, worst=gap)
+                if one.read is not None:
+                    _read_again(trial, one, title, form)
+                elif one.name in _RUNS:
+                    _run_again(trial, one, representation, form, values)
+                else:
+                    trial.skipped.append(f"{one.name}: there is no way back from it")
             except (LossError, MissingExtraError) as error:
-                why = f"{one.name}: {representation}: {first_line(error)}"
-                trial.skipped.append(why)
+                trial.skipped.append(f"{title}: {first_line(error)}")
     return trial.result()
 
 
-def _tried(
-    one: Format,
-    representation: str,
-    form: Model,
-    values: FloatArray,
-    skipped: list[str],
-) -> Iterator[tuple[int, float, str | None]]:
-    """Yield, for each variant, how much was compared, its gap, and its fault."""
-    if one.read is not None:
-        yield _read_again(one, representation, form)
-        return
-    opener = _OPENERS.get(one.name)
-    if opener is None:
-        skipped.append(f"{one.name}: there is no way back from it")
-        return
-    for dtype in _dtypes(one):
-        title = f"{one.name} {dtype}: {representation}"
-        # Every writer knows allow_loss; those with number types know dtype as well.
-        write = cast("Callable[..., Written]", one.write)
-        options: dict[str, object] = {}
-        if "dtype" in _options(one):
-            options["dtype"] = dtype
-        if "outputs" in _options(one):
-            columns = ("label", "rule", "status", "strengths")
-            options["outputs"] = columns if isinstance(form, RuleBase) else columns[:3]
-        try:
-            run = opener(write(form, **options).content, form)
-            base = baseline(dtype).load(form)
-        except LossError as error:
-            skipped.append(f"{title}: {first_line(error)}")
-            continue
-        yield _compared(title, run(values), base(values))
-
-
-def _read_again(
-    one: Format, representation: str, form: Model
-) -> tuple[int, float, str | None]:
-    title = f"{one.name}: {representation}"
+def _read_again(trial: Trial, one: Format, title: str, form: Model) -> None:
     assert one.read is not None  # the caller tests it
     written = one.write(form)
     try:
         again = one.read(written.content, title)
     except ReadError as error:
-        return 1, 1.0, f"{title}: it cannot be read again: {first_line(error)}"
+        why = f"{title}: it cannot be read again: {first_line(error)}"
+        trial.add(1, why, worst=1.0)
+        return
     match equivalence(form, written, again):
+        case "equal" if one.write(again.model).content == written.content:
+            trial.add(2)
         case "equal":
-            is_same = one.write(again.model).content == written.content
-            other_bytes = f"{title}: written again it has other bytes"
-            return (2, 0.0, None) if is_same else (1, 0.0, other_bytes)
+            trial.add(1, f"{title}: written again it has other bytes")
         case "alike" if not isinstance(form, FuzzyTree):
-            return 1, 0.0, None
+            trial.add(1)
         case _:
-            return 1, 1.0, f"{title}: the model that comes back is not equal"
+            why = f"{title}: the model that comes back is not equal"
+            trial.add(1, why, worst=1.0)
 
 
-def _compared(
-    title: str, actual: Outcome, expected: Outcome
-) -> tuple[int, float, str | None]:
-    """Return how many rows were compared, the largest gap, and what is wrong."""
-    wrong = unequal(actual, expected)
-    gap = float(strength_gap(actual, expected).max(initial=0.0))
-    if not wrong.any():
-        return wrong.size, gap, None
-    fault = (
-        f"{title}: {int(wrong.sum())} of {wrong.size} rows are answered differently, "
-        f"strengths by up to {gap:.3g}"
-    )
-    return wrong.size, gap, fault
+def _run_again(
+    trial: Trial, one: Format, representation: str, form: Model, values: FloatArray
+) -> None:
+    """Run a file in each of its number types beside the native runtime."""
+    known = {fact.name for fact in options_of(one)}
+    wanted: dict[str, object] = {"outputs": ("label", "rule", "status", "strengths")}
+    if isinstance(form, FuzzyTree):
+        wanted = {"outputs": ("label", "rule", "status")}
+    for dtype in get_args(Dtype) if "dtype" in known else ("float64",):
+        title = f"{one.name} {dtype}: {representation}"
+        options = {k: v for k, v in {"dtype": dtype, **wanted}.items() if k in known}
+        write = cast("Callable[..., Any]", one.write)  # the options are its own
+        try:
+            run = _RUNS[one.name](write(form, **options).content, form)
+            expected = baseline(dtype).load(form)(values)
+        except LossError as error:
+            trial.skipped.append(f"{title}: {first_line(error)}")
+            continue
+        actual = run(values)
+        wrong = unequal(actual, expected)
+        gap = float(strength_gap(actual, expected).max(initial=0.0))
+        fault = (
+            f"{title}: {int(wrong.sum())} of {wrong.size} rows are answered "
+            f"differently, strengths by up to {gap:.3g}"
+        )
+        trial.add(wrong.size, fault if wrong.any() else None, worst=gap)
 
 
-def _options(one: Format) -> tuple[str, ...]:
-    return tuple(inspect.signature(one.write).parameters)
-
-
-def _dtypes(one: Format) -> tuple[Dtype, ...]:
-    return get_args(Dtype) if "dtype" in _options(one) else ("float64",)
-
-
-def _from_onnx(content: bytes, _: Model) -> Run:
-    return open_onnx(content, "the written file").run
-
-
-_OPENERS: dict[str, Callable[[bytes, Model], Run]] = {
-    "onnx": _from_onnx,
+_RUNS: dict[str, Callable[[bytes, Model], Run]] = {
+    "onnx": lambda content, _: open_onnx(content, "the written file").run,
     "python": load_content,
 }
 """How a file that is not read as a model is run again, by the name of its format."""
