@@ -489,9 +489,11 @@ def _shows_win(case: Case, answer: Answer, state: Witness) -> None:
 def _shows_tie(case: Case, answer: Answer, state: Witness) -> None:
     """Check that a claim compares rules that tie with all others."""
     met = [c for c in state.claims if c.kind == "ties"]
+    every = {*case.numbers}
+    if answer.code == "FT101":  # others of its class do not matter
+        every = {*answer.rules, *case.rivals(answer.rules[0])}
     is_all = any(
-        {*answer.rules} <= {*c.rules} and {*c.rules, *c.rivals} == {*case.numbers}
-        for c in met
+        {*answer.rules} <= {*c.rules} and every <= {*c.rules, *c.rivals} for c in met
     )
     require(is_all, "it is not claimed that they tie above all others")
     if answer.code == "FT202":
