@@ -133,17 +133,17 @@ def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
     if not spans and isinstance(answer.state, Witness):
         spans = answer.state.region
     region = {span.variable: span for span in spans}
-    values = _values(point, scene)
+    values = axis_values(scene.viewed.rules, point)
     shown = _concerning(answer, region, values, scene)
     bars = [
         (
-            _bar_text(axis, region.get(axis.name), _near(values, axis)),
+            _bar_text(axis, region.get(axis.name), values.get(axis.name)),
             terms_picture(
                 axis,
                 None,
                 f"{name}-v{k}",
                 span=region.get(axis.name),
-                value=_near(values, axis),
+                value=values.get(axis.name),
                 named={one.term for one in answer.terms if one.variable == axis.name},
             ),
         )
@@ -159,50 +159,33 @@ def _bar_text(axis: Axis, span: Span | None, value: float | None) -> str:
     return f"{axis.name}: {'; '.join(said)}" if said else axis.name
 
 
-def _values(point: Mapping[str, Fraction], scene: Scene) -> dict[str, Fraction]:
-    """Return the value of every variable at a point, as far as it is known."""
-    rules = scene.viewed.rules
-    if rules is None or not point:
-        return dict(point)
-    return exact_axes(rules, point) or dict(point)
-
-
-def exact_axes(
-    rules: RuleBase, point: Mapping[str, Fraction]
-) -> dict[str, Fraction] | None:
-    """Return the value of every variable at a point; None if an input has no value.
+def axis_values(
+    rules: RuleBase | None, point: Mapping[str, Fraction]
+) -> dict[str, float]:
+    """Return the value of every variable at a point, as far as it is known.
 
     Example:
         >>> from fuzzytree.model.rulebase import Part, Rule, Variable
         >>> sums = Variable("sum", parts=(Part("a", 2.0, 1.0),))
         >>> rules = RuleBase("r", ("k",), (Variable("a"), sums), (Rule((), "k"),))
-        >>> exact_axes(rules, {"a": Fraction(1, 3)})["sum"]
-        Fraction(-4, 3)
+        >>> axis_values(rules, {"a": Fraction(1, 4)})
+        {'a': 0.25, 'sum': -1.5}
     """
-    if any(name not in point for name in rules.inputs):
-        return None
-    axes = {name: point[name] for name in rules.inputs}
-    for variable in rules.variables:
-        if variable.parts:
-            axes[variable.name] = sum(
-                (
-                    Fraction(one.weight) * (point[one.input] - Fraction(one.centre))
-                    for one in variable.parts
-                ),
-                start=Fraction(0),
+    values = {name: float(value) for name, value in point.items()}
+    for variable in rules.variables if rules else ():
+        if variable.parts and all(one.input in point for one in variable.parts):
+            products = (
+                Fraction(one.weight) * (point[one.input] - Fraction(one.centre))
+                for one in variable.parts
             )
-    return axes
-
-
-def _near(values: Mapping[str, Fraction], axis: Axis) -> float | None:
-    value = values.get(axis.name)
-    return None if value is None else float(value)
+            values[variable.name] = float(sum(products))
+    return values
 
 
 def _concerning(
     answer: AuditAnswer,
     region: Mapping[str, Span],
-    values: Mapping[str, Fraction],
+    values: Mapping[str, float],
     scene: Scene,
 ) -> list[Axis]:
     """Return the variables to draw: of the region, or else of the rules and terms."""

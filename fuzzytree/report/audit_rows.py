@@ -13,7 +13,6 @@ from fuzzytree.model import (
     FuzzyTree,
     IntArray,
     RuleBase,
-    Variable,
 )
 from fuzzytree.runtimes import axis_lines, plan_axes
 
@@ -47,20 +46,13 @@ class Passing(NamedTuple):
 
 def data_of(model: FuzzyTree | RuleBase | FuzzySystem, rows: AuditRows) -> Data:
     """Return the rows on every axis of a model."""
-    count = rows.values.shape[1]
-    variables: tuple[Variable, ...]
-    if isinstance(model, FuzzySystem):
-        variables = model.variables
-        classes: tuple[str, ...] = ()
-    else:
-        variables, classes = model.variables, model.classes
-    if rows.codes is None:
-        classes = ()
-    plan = plan_axes(variables)
+    classes = () if isinstance(model, FuzzySystem) else model.classes
+    classes = () if rows.codes is None else classes
+    plan = plan_axes(model.variables)
     with np.errstate(over="ignore", invalid="ignore"):  # no finite number is drawn
         lines = np.asarray(axis_lines(plan, rows.values), np.float64)
     axes = {name: lines[line] for name, line in plan.line.items()}
-    codes = np.zeros(count, np.int64)
+    codes = np.zeros(rows.values.shape[1], np.int64)
     if classes and rows.codes is not None:
         codes = np.where(rows.codes < 0, len(classes), rows.codes).astype(np.int64)
     return Data(axes, codes, classes)

@@ -20,7 +20,7 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.numerics.exact import exact_axis, exact_degree
-from fuzzytree.report.audit_findings import exact_axes
+from fuzzytree.report.audit_findings import axis_values
 from fuzzytree.report.audit_rows import data_of, histogram, passing
 from fuzzytree.report.drawing import (
     Axis,
@@ -63,10 +63,9 @@ def test_the_axes_of_a_point_are_exact() -> None:
     mix = Variable("mix", parts=(Part("a", 0.1, 0.3), Part("b", -1.7)))
     rules = RuleBase("r", ("k",), (Variable("a"), Variable("b"), mix), ALWAYS)
     point = {"a": Fraction(0.7), "b": Fraction(1e-9)}
-    found = exact_axes(rules, point)
-    assert found is not None
-    assert found["mix"] == exact_axis(mix, {"a": 0.7, "b": 1e-9})
-    assert exact_axes(rules, {"a": Fraction(1)}) is None
+    found = axis_values(rules, point)
+    assert found["mix"] == float(exact_axis(mix, {"a": 0.7, "b": 1e-9}))
+    assert axis_values(rules, {"a": Fraction(1)}) == {"a": 1.0}
 
 
 def test_a_drawn_curve_goes_through_the_exact_degrees_and_its_steps() -> None:
