@@ -406,7 +406,7 @@ def test_the_weights_of_a_systems_rules_are_reported() -> None:
         for one in system.blocks
     ]
     audit = audit_of(rule_base(), (), form="system")
-    said = "The strengths of these are multiplied by their weights: rule 1 by 0.25"
+    said = "The strengths of these are multiplied by their weights: rule 5 by 0.25"
     plain, weighted = (
         Outline(page(audit, one)).text
         for one in (system, replace(system, blocks=tuple(blocks)))
