@@ -24,42 +24,36 @@ from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import reason
 from fuzzytree.model import noticed, watched
 
+_OWN = (
+    *("learn", "collect", "show", "export", "convert", "run", "check", "audit"),
+    *("diff", "explain", "recheck", "bench", "needs", "stability", "tactile"),
+    *("formats", "doctor"),
+)
 VERBS: Mapping[str, str] = MappingProxyType(
-    {
-        "learn": "fuzzytree.cli.learn",
-        "collect": "fuzzytree.cli.collect",
-        "show": "fuzzytree.cli.show",
-        "export": "fuzzytree.cli.export",
-        "convert": "fuzzytree.cli.convert",
-        "run": "fuzzytree.cli.run",
-        "check": "fuzzytree.cli.check",
-        "audit": "fuzzytree.cli.audit",
-        "diff": "fuzzytree.cli.diff",
-        "explain": "fuzzytree.cli.explain",
-        "recheck": "fuzzytree.cli.recheck",
-        "bench": "fuzzytree.cli.bench",
-        "needs": "fuzzytree.cli.needs",
-        "stability": "fuzzytree.cli.stability",
-        "tactile": "fuzzytree.tactile.cli",
-        "formats": "fuzzytree.cli.formats",
-        "doctor": "fuzzytree.cli.doctor",
-    }
+    {name: f"fuzzytree.cli.{name}" for name in _OWN}
+    | {"tactile": "fuzzytree.tactile.cli"}
 )
 """The module whose `command` each verb is, in the order of the help."""
 
 
 class Verbs(click.Group):
-    """A group that imports a verb's module when the verb is used."""
+    """A group that imports a verb's module when the verb is used.
+
+    Attributes:
+        modules: The module whose `command` each verb is, in the order of the help.
+    """
+
+    modules: Mapping[str, str] = VERBS
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order of their usual use."""
-        return list(VERBS)
+        return list(self.modules)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return a verb, or None if there is none of that name."""
-        if cmd_name not in VERBS:
+        if cmd_name not in self.modules:
             return None
-        module = importlib.import_module(VERBS[cmd_name])
+        module = importlib.import_module(self.modules[cmd_name])
         command: click.Command = module.command
         return command
 
@@ -68,11 +62,11 @@ class Verbs(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the verb, or say which one it might have been."""
         name = args[0]
-        if name not in VERBS and not name.startswith("-"):
-            close = difflib.get_close_matches(name, VERBS, n=1)
+        if name not in self.modules and not name.startswith("-"):
+            close = difflib.get_close_matches(name, self.modules, n=1)
             hint = f" (did you mean {close[0]!r}?)" if close else ""
             raise click.UsageError(
-                f"no verb {name!r}; there is {', '.join(VERBS)}{hint}", ctx
+                f"no verb {name!r}; there is {', '.join(self.modules)}{hint}", ctx
             )
         return super().resolve_command(ctx, args)
 

@@ -2,39 +2,25 @@
 
 from __future__ import annotations
 
-import importlib
+from types import MappingProxyType
 
 import click
 
+from fuzzytree.cli import Verbs
+
 ACTIONS = (
-    "ports",
-    "record",
-    "replay",
-    "live",
-    "simulate",
-    "press",
-    "features",
-    "interpolate",
-    "export",
-    "check",
+    *("ports", "record", "replay", "live", "simulate", "press"),
+    *("features", "interpolate", "export", "check"),
 )
 """Each action is the `command` of the module `fuzzytree.tactile.cli.ACTION`."""
 
 
-class Actions(click.Group):
-    """A group that imports an action's module on its first use."""
+class Actions(Verbs):
+    """The actions, in the order in which one needs them."""
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the actions in the order in which one needs them."""
-        return list(ACTIONS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return an action, or None if there is none of that name."""
-        if cmd_name not in ACTIONS:
-            return None
-        module = importlib.import_module(f"fuzzytree.tactile.cli.{cmd_name}")
-        command: click.Command = module.command
-        return command
+    modules = MappingProxyType(
+        {name: f"fuzzytree.tactile.cli.{name}" for name in ACTIONS}
+    )
 
 
 @click.group(
