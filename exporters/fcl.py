@@ -18,7 +18,6 @@ from fuzzytree.exporters.fcl_rules import (
     has_accu,
     losses_of,
     norm_losses,
-    uses,
     with_conditions,
 )
 from fuzzytree.exporters.fcl_terms import (
@@ -41,6 +40,7 @@ from fuzzytree.model import (
     SystemOutput,
     Variable,
     Written,
+    joints,
     refusal,
 )
 from fuzzytree.semantics import (
@@ -306,7 +306,9 @@ def _remarks(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator
             "jFuzzyLogic samples the low ends of 1000 pieces of a range, not their "
             "middles: its outputs are up to half a piece lower"
         )
-    if words.name == "portable" and any(uses(rule.when, Or) for rule in system.rules):
+    if words.name == "portable" and any(
+        Or in joints(rule.when) for rule in system.rules
+    ):
         yield "JFML does not read OR; fuzzylite and jFuzzyLogic agree on it"
 
 

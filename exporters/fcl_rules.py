@@ -18,10 +18,8 @@ from fuzzytree.formats import (
 )
 from fuzzytree.model import (
     And,
-    Condition,
     FuzzySystem,
     Loss,
-    Not,
     Or,
     Points,
     Proposition,
@@ -31,6 +29,7 @@ from fuzzytree.model import (
     SystemOutput,
     SystemRule,
     Term,
+    condition_text,
     joints,
     questions,
     unlike,
@@ -94,8 +93,8 @@ def block_lines(
 
 def _operators(block: RuleBlock, words: FclWords) -> Iterator[str]:
     """Yield the lines for OR and AND: in this order, for the last one counts."""
-    uses_or = any(uses(rule.when, Or) for rule in block.rules)
-    uses_and = any(uses(rule.when, And) for rule in block.rules)
+    uses_or = any(Or in joints(rule.when) for rule in block.rules)
+    uses_and = any(And in joints(rule.when) for rule in block.rules)
     # The standard has one line for both; others read OR, and then AND.
     says_or = uses_or if words.has_pair else True
     says_and = True
@@ -111,32 +110,20 @@ def _text(rule: SystemRule, words: FclWords, words_of: WordsOf, always: str) -> 
     if words.has_hedges:
         return rule_text(rule, words_of, always)
     says = str.lower if words.is_lower else str.upper
-    when = always if rule.when is None else _condition(rule.when, words_of, says)
+    when = always
+    if rule.when is not None:  # jFuzzyLogic reads AND and OR from left to right
+        when = condition_text(
+            rule.when,
+            lambda one: _proposition(one, words_of, says),
+            says,
+            has_all_brackets=True,
+        )
     then = words.joiner.join(
         _proposition(Proposition(one.output, (one.term,)), words_of, says)
         for one in rule.then
     )
     weight = "" if rule.weight == 1.0 else f"{says(' with ')}{float(rule.weight)!r}"
     return f"{says('if ')}{when}{says(' then ')}{then}{weight};"
-
-
-def _condition(
-    condition: Condition, words_of: WordsOf, says: Callable[[str], str], level: int = 0
-) -> str:
-    """Return a condition; what is nested always has parentheses.
-
-    So it does not matter that jFuzzyLogic reads AND and OR from left to right.
-    """
-    match condition:
-        case Proposition():
-            return _proposition(condition, words_of, says)
-        case Not(part=part):
-            return f"{says('not ')}({_condition(part, words_of, says)})"
-        case And(parts=parts) | Or(parts=parts):
-            word = says(" and " if isinstance(condition, And) else " or ")
-            inner = [_condition(part, words_of, says, level + 1) for part in parts]
-            text = word.join(inner)
-            return f"({text})" if level and len(parts) > 1 else text
 
 
 def _proposition(
@@ -148,18 +135,6 @@ def _proposition(
     for _ in range(nots - 1):
         text = f"{says('not ')}({text})"
     return text
-
-
-def uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
-    """Return whether a condition has an AND, or an OR, of several parts."""
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            is_one = isinstance(condition, kind) and len(parts) > 1
-            return is_one or any(uses(part, kind) for part in parts)
-        case Not(part=part):
-            return uses(part, kind)
-        case _:
-            return False
 
 
 def rule_losses(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
@@ -187,8 +162,8 @@ def rule_losses(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
 def norm_losses(block: RuleBlock, number: int, words: FclWords) -> Iterator[str]:
     """Yield the operators of a block that the dialect has no words for."""
     where = f"rule block {number}"
-    uses_and = any(uses(rule.when, And) for rule in block.rules)
-    uses_or = any(uses(rule.when, Or) for rule in block.rules)
+    uses_and = any(And in joints(rule.when) for rule in block.rules)
+    uses_or = any(Or in joints(rule.when) for rule in block.rules)
     if uses_and and block.conjunction not in words.ands:
         yield f"{where}: the dialect {words.name} has no AND {block.conjunction!r}"
     if uses_or and block.disjunction not in words.ors:
@@ -239,7 +214,7 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
     for k, block in enumerate(system.blocks, 1):
         pairs = JFUZZYLOGIC_PAIRS if words.name == "jfuzzylogic" else PAIRS
         both = [
-            any(uses(rule.when, kind) for rule in block.rules) for kind in (And, Or)
+            any(kind in joints(rule.when) for rule in block.rules) for kind in (And, Or)
         ]
         norm = block.conjunction
         if not words.has_pair or not all(both) or norm is None:
@@ -395,9 +370,9 @@ def _operator_names(system: FuzzySystem) -> Iterator[str]:
     result: list[str] = []
     is_curved = any(not output.defuzzifier.is_weighted for output in system.outputs)
     for block in system.blocks:
-        if any(uses(rule.when, And) for rule in block.rules):
+        if any(And in joints(rule.when) for rule in block.rules):
             result.append(f"AND {block.conjunction}")
-        if any(uses(rule.when, Or) for rule in block.rules):
+        if any(Or in joints(rule.when) for rule in block.rules):
             result.append(f"OR {block.disjunction}")
         if is_curved:
             result.append(f"ACT {block.implication}")

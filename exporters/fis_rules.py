@@ -30,6 +30,8 @@ from fuzzytree.model import (
     SystemOutput,
     SystemRule,
     Term,
+    combined,
+    condition_text,
     questions,
     unlike,
 )
@@ -99,7 +101,7 @@ class FisTerms:
 
     def joined(self, parts: Sequence[Condition], *, is_or: bool) -> str:
         """Return the number of a term for several propositions on one input."""
-        whole = Or(tuple(parts)) if is_or else And(tuple(parts))
+        whole = combined(Or if is_or else And, parts)
         if whole in self._made:
             return str(self.place(*self._made[whole]))
         variable = next(questions(whole)).variable
@@ -244,8 +246,6 @@ def _simple(condition: Condition) -> Condition:
     match condition:
         case Not(part=Proposition(hedges=hedges) as part):
             return msgspec.structs.replace(part, hedges=("not", *hedges))
-        case And(parts=(part,)) | Or(parts=(part,)):
-            return _simple(part)
         case _:
             return condition
 
@@ -300,12 +300,4 @@ def _hundredths(
 
 
 def _text_of(condition: Condition) -> str:
-    match condition:
-        case Proposition(term=label, hedges=hedges):
-            return " ".join((*hedges, label or ""))
-        case Not(part=part):
-            return f"not {_text_of(part)}"
-        case And(parts=parts):
-            return " and ".join(map(_text_of, parts))
-        case Or(parts=parts):
-            return " or ".join(map(_text_of, parts))
+    return condition_text(condition, lambda one: " ".join((*one.hedges, *one.terms)))

@@ -34,6 +34,8 @@ from fuzzytree.model import (
     SystemOutput,
     SystemRule,
     Term,
+    condition_text,
+    conditions_in,
     curves,
     joints,
     questions,
@@ -83,13 +85,10 @@ def has_not(
     condition: Condition | None, *, of: type | tuple[type, ...] = object
 ) -> bool:
     """Return whether a condition has a NOT that is no hedge, of a kind of condition."""
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            return any(has_not(part, of=of) for part in parts)
-        case Not(part=part):
-            return isinstance(part, of) or has_not(part, of=of)
-        case _:
-            return False
+    return any(
+        isinstance(one, Not) and isinstance(one.part, of)
+        for one in conditions_in(condition)
+    )
 
 
 def _pushed(condition: Condition, nots: int) -> Condition:
@@ -109,36 +108,20 @@ def _pushed(condition: Condition, nots: int) -> Condition:
 
 def rule_text(rule: SystemRule, words_of: WordsOf, always: str) -> str:
     """Return a rule as fuzzylite reads it."""
-    when = always if rule.when is None else _condition_text(rule.when, words_of, 0)
+
+    def said(one: Proposition) -> str:
+        label, hedges = one.term, one.hedges
+        if "any" in hedges:  # whatever stands behind it makes no difference
+            label, hedges = None, hedges[: hedges.index("any") + 1]
+        return _statement(one.variable, label, hedges, words_of)
+
+    condition = rule.when and _pushed(rule.when, 0)
+    when = condition_text(condition, said) if condition else always
     then = " and ".join(
         _statement(one.output, one.term, one.hedges, words_of) for one in rule.then
     )
     weight = "" if rule.weight == 1.0 else f" with {float(rule.weight)!r}"
     return f"if {when} then {then}{weight}"
-
-
-def _condition_text(condition: Condition, words_of: WordsOf, level: int) -> str:
-    """Return a condition; at level 1 an OR needs parentheses, at level 2 an AND too."""
-    match condition:
-        case Proposition(variable=variable, term=label, hedges=hedges):
-            if "any" in hedges:  # whatever stands behind it makes no difference
-                label, hedges = None, hedges[: hedges.index("any") + 1]
-            return _statement(variable, label, hedges, words_of)
-        case Not(part=Proposition() as part):
-            return _condition_text(_pushed(part, 1), words_of, level)
-        case Not():
-            raise TypeError(
-                "a NOT of several conditions in a block that `speakable` returned"
-            )
-        case And(parts=parts):
-            text = " and ".join(_condition_text(part, words_of, 2) for part in parts)
-            return f"({text})" if level > 1 and len(parts) > 1 else text
-        case Or(parts=parts):
-            text = " or ".join(
-                _condition_text(part, words_of, 2 if isinstance(part, Or) else 1)
-                for part in parts
-            )
-            return f"({text})" if level > 0 and len(parts) > 1 else text
 
 
 def _statement(

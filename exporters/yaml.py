@@ -31,7 +31,7 @@ from fuzzytree.formats import (
     LONGEST_SENTENCE,
     FormulaError,
     conclusions_text,
-    condition_text,
+    condition_sentence,
     condition_texts,
     parse,
     read_yaml,
@@ -120,7 +120,7 @@ def _losses(model: Document) -> Iterator[Loss]:
         case RuleBase():
             counts = [(f"rule {n}", r.support) for n, r in enumerate(model.rules, 1)]
             shared = {id(one): one for rule in model.rules for one in rule.when}
-            texts = {key: condition_text(one) for key, one in shared.items()}
+            texts = {key: condition_sentence(one) for key, one in shared.items()}
             for number, rule in enumerate(model.rules, 1):
                 yield from _long(f"rule {number}", [texts[id(p)] for p in rule.when])
         case FuzzyTree():
@@ -159,7 +159,7 @@ def _rule_base(rules: RuleBase) -> dict[str, Entry]:
     for rule in rules.rules:
         for one in rule.when:
             if id(one) not in texts:
-                texts[id(one)] = condition_text(one)
+                texts[id(one)] = condition_sentence(one)
         whole: dict[str, Entry] = {
             "if": Short([texts[id(one)] for one in rule.when]),
             "then": rule.then,

@@ -65,7 +65,7 @@ from .yaml.binding import located as located
 from .yaml.binding import record as record
 from .yaml.binding import value_of as value_of
 from .yaml.conditions import conclusions_text as conclusions_text
-from .yaml.conditions import condition_text as condition_text
+from .yaml.conditions import condition_sentence as condition_sentence
 from .yaml.conditions import condition_texts as condition_texts
 from .yaml.layout import LARGEST_COUNT as LARGEST_COUNT
 from .yaml.layout import LONGEST_NOTE as LONGEST_NOTE

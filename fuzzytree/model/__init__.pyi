@@ -136,6 +136,9 @@ from .rules import Proposition as Proposition
 from .rules import Relation as Relation
 from .rules import RuleBlock as RuleBlock
 from .rules import SystemRule as SystemRule
+from .rules import combined as combined
+from .rules import condition_text as condition_text
+from .rules import conditions_in as conditions_in
 from .rules import joints as joints
 from .rules import questions as questions
 from .system import MOST_SAMPLES as MOST_SAMPLES

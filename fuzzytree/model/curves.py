@@ -214,11 +214,36 @@ class Sigmoid(MembershipFunction, frozen=True, tag="sigmoid"):
         return True
 
 
-class SigmoidDifference(MembershipFunction, frozen=True, tag="sigmoid difference"):
-    """The absolute difference of two sigmoids."""
+class _TwoSigmoids(MembershipFunction, frozen=True):
+    """What is made of two sigmoids."""
 
     first: Sigmoid
     second: Sigmoid
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """That of both together."""
+        (a, b), (c, d) = self.first.extent, self.second.extent
+        return min(a, c), max(b, d)
+
+    @property
+    def is_bent_once(self) -> bool:
+        """Not surely."""
+        return False
+
+    @property
+    def is_unit(self) -> bool:
+        """Whether no slope is 0."""
+        return self.first.is_unit and self.second.is_unit
+
+    def mistakes(self) -> Iterator[str]:
+        """Yield what is wrong with either."""
+        yield from self.first.mistakes()
+        yield from self.second.mistakes()
+
+
+class SigmoidDifference(_TwoSigmoids, frozen=True, tag="sigmoid difference"):
+    """The absolute difference of two sigmoids."""
 
     def degree(self, n: Numbers[N], x: N) -> N:
         """Return how far the two are apart."""
@@ -237,33 +262,9 @@ class SigmoidDifference(MembershipFunction, frozen=True, tag="sigmoid difference
                 inner |= {place - 8.0 * off, place + 8.0 * off, *around(place)}
         return tuple(sorted(inner))
 
-    @property
-    def extent(self) -> tuple[float, float]:
-        """That of both together."""
-        (a, b), (c, d) = self.first.extent, self.second.extent
-        return min(a, c), max(b, d)
 
-    @property
-    def is_bent_once(self) -> bool:
-        """Not surely."""
-        return False
-
-    @property
-    def is_unit(self) -> bool:
-        """Whether no slope is 0."""
-        return self.first.is_unit and self.second.is_unit
-
-    def mistakes(self) -> Iterator[str]:
-        """Yield what is wrong with either."""
-        yield from self.first.mistakes()
-        yield from self.second.mistakes()
-
-
-class SigmoidProduct(MembershipFunction, frozen=True, tag="sigmoid product"):
+class SigmoidProduct(_TwoSigmoids, frozen=True, tag="sigmoid product"):
     """The product of two sigmoids."""
-
-    first: Sigmoid
-    second: Sigmoid
 
     def degree(self, n: Numbers[N], x: N) -> N:
         """Return one times the other."""
@@ -272,27 +273,6 @@ class SigmoidProduct(MembershipFunction, frozen=True, tag="sigmoid product"):
     def knots(self) -> tuple[float, ...]:
         """Return where either bends the other way."""
         return tuple(sorted({self.first.inflection, self.second.inflection}))
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """That of both together."""
-        (a, b), (c, d) = self.first.extent, self.second.extent
-        return min(a, c), max(b, d)
-
-    @property
-    def is_bent_once(self) -> bool:
-        """Not surely."""
-        return False
-
-    @property
-    def is_unit(self) -> bool:
-        """Whether no slope is 0."""
-        return self.first.is_unit and self.second.is_unit
-
-    def mistakes(self) -> Iterator[str]:
-        """Yield what is wrong with either."""
-        yield from self.first.mistakes()
-        yield from self.second.mistakes()
 
 
 class SCurve(MembershipFunction, frozen=True, tag="s"):

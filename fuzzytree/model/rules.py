@@ -5,7 +5,7 @@ What they *mean* is computed in `fuzzytree.semantics.inference`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Literal
 
 from fuzzytree.model.curves import MOST_LEVELS
@@ -142,31 +142,75 @@ class RuleBlock(Value, frozen=True):
     name: str = ""
 
 
+def conditions_in(condition: Condition | None) -> Iterator[Condition]:
+    """Yield a condition and all conditions that it consists of, from left to right."""
+    if condition is not None:
+        yield condition
+    for part in _parts(condition):
+        yield from conditions_in(part)
+
+
 def questions(condition: Condition | None) -> Iterator[Proposition]:
     """Yield the propositions of a condition, from left to right."""
-    match condition:
-        case Proposition():
-            yield condition
-        case And(parts=parts) | Or(parts=parts):
-            for part in parts:
-                yield from questions(part)
-        case Not(part=part):
-            yield from questions(part)
-        case None:
-            return
+    return (one for one in conditions_in(condition) if isinstance(one, Proposition))
 
 
 def joints(condition: Condition | None) -> Iterator[type[And] | type[Or]]:
     """Yield how the parts of a condition are joined, from the outside in."""
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            yield type(condition)
-            for part in parts:
-                yield from joints(part)
-        case Not(part=part):
-            yield from joints(part)
-        case _:
-            return
+    return (type(one) for one in conditions_in(condition) if isinstance(one, And | Or))
+
+
+def combined(kind: type[And] | type[Or], parts: Iterable[Condition]) -> Condition:
+    """Return conditions joined by AND or OR; a single one as it is.
+
+    Example:
+        >>> low = Proposition("force", ("low",))
+        >>> combined(And, [low]) == low
+        True
+    """
+    every = tuple(parts)
+    return every[0] if len(every) == 1 else kind(every)
+
+
+def condition_text(
+    condition: Condition,
+    proposition_text: Callable[[Proposition], str],
+    says: Callable[[str], str] = str,
+    *,
+    has_all_brackets: bool = False,
+) -> str:
+    """Return a condition in words, with brackets where AND does not bind closer.
+
+    Args:
+        condition: The condition.
+        proposition_text: Returns the words of a proposition.
+        says: Returns how `and`, `or` and `not` are written.
+        has_all_brackets: Whether an AND within an OR has brackets too.
+
+    Example:
+        >>> a, b = (Proposition("force", (term,)) for term in ("low", "high"))
+        >>> condition_text(And((Not(a), Or((a, b)))), lambda one: one.terms[0])
+        'not (low) and (low or high)'
+    """
+
+    def text(one: Condition) -> str:
+        match one:
+            case Proposition():
+                return proposition_text(one)
+            case Not(part=part):
+                return f"{says('not')} ({text(part)})"
+            case And(parts=parts) | Or(parts=parts):
+                closer = () if has_all_brackets or isinstance(one, And) else (And,)
+                texts = [
+                    f"({text(part)})"
+                    if isinstance(part, And | Or) and not isinstance(part, closer)
+                    else text(part)
+                    for part in parts
+                ]
+                word = "and" if isinstance(one, And) else "or"
+                return f" {says(word)} ".join(texts)
+
+    return text(condition)
 
 
 Terms = Mapping[str, Mapping[str, None]]
@@ -187,8 +231,10 @@ def condition_mistakes(
     if _levels(condition) > MOST_LEVELS:
         yield f"nested deeper than {MOST_LEVELS} levels"
         return
-    if _is_empty(condition):
-        yield "it joins no conditions at all"
+    for one in conditions_in(condition):
+        if isinstance(one, And | Or) and len(one.parts) < 2:
+            yield "it joins fewer than two conditions"
+    kinds = set(joints(condition))
     for one in questions(condition):
         if len(one.terms) > 1:
             each = " or ".join(f"{one.variable} is {term}" for term in one.terms)
@@ -197,9 +243,9 @@ def condition_mistakes(
             yield from reference_mistakes(one.variable, one.term, terms)
         elif not one.hedges or one.hedges[-1] != "any":
             yield f"{one.variable!r} is used without a term"
-    if block.conjunction is None and _uses(condition, And):
+    if block.conjunction is None and And in kinds:
         yield "it needs a conjunction, and its block has none"
-    if block.disjunction is None and _uses(condition, Or):
+    if block.disjunction is None and Or in kinds:
         yield "it needs a disjunction, and its block has none"
 
 
@@ -212,13 +258,6 @@ def reference_mistakes(variable: str, label: str | None, terms: Terms) -> Iterat
         yield f"{variable!r} has no term {label!r}; {choice}"
 
 
-def _is_empty(condition: Condition | None) -> bool:
-    """Return whether a condition joins nothing anywhere."""
-    if isinstance(condition, And | Or) and not condition.parts:
-        return True
-    return any(map(_is_empty, _parts(condition)))
-
-
 def _levels(condition: Condition | None) -> int:
     deepest, todo = 0, [(condition, 1)]
     while todo:
@@ -229,7 +268,7 @@ def _levels(condition: Condition | None) -> int:
     return deepest
 
 
-def _parts(condition: Condition | None) -> Iterable[Condition]:
+def _parts(condition: Condition | None) -> tuple[Condition, ...]:
     match condition:
         case And(parts=parts) | Or(parts=parts):
             return parts
@@ -237,9 +276,3 @@ def _parts(condition: Condition | None) -> Iterable[Condition]:
             return (part,)
         case _:
             return ()
-
-
-def _uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
-    if isinstance(condition, kind):
-        return True
-    return any(_uses(part, kind) for part in _parts(condition))

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 
-from fuzzytree.formats import conclusions_text, condition_text, text_of
+from fuzzytree.formats import conclusions_text, condition_sentence, text_of
 from fuzzytree.model import (
     LR,
     Activation,
@@ -368,7 +368,7 @@ def rule_text(rule: SystemRule) -> str:
     name = f"  ({rule.name})" if rule.name else ""
     if rule.when is None:
         return f"ALWAYS {ends}{weight}{name}"
-    return f"IF {condition_text(rule.when)} THEN {ends}{weight}{name}"
+    return f"IF {condition_sentence(rule.when)} THEN {ends}{weight}{name}"
 
 
 _GRIDS = {

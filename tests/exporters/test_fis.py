@@ -342,7 +342,7 @@ def rows(written: Written) -> list[str]:
             "2 1, 1 (1.0) : 2",
         ),
         (
-            And((And((Proposition("a", ("low",)), Proposition("b", ("low",)))),)),
+            And((Proposition("a", ("low",)), Proposition("b", ("low",)))),
             "1 1, 1 (1.0) : 1",
         ),
         (

@@ -147,7 +147,16 @@ def test_all_mistakes_of_a_system_are_reported_at_once() -> None:
             "when",
             "no variable 'b'; there is a, y",
         ),
-        (replace(RULE, when=Not(And(()))), "when", "it joins no conditions at all"),
+        (
+            replace(RULE, when=Not(And(()))),
+            "when",
+            "it joins fewer than two conditions",
+        ),
+        (
+            replace(RULE, when=Or((Proposition("a", ("low",)),))),
+            "when",
+            "it joins fewer than two conditions",
+        ),
         (replace(RULE, then=()), "then", "it concludes nothing"),
         (
             replace(RULE, then=(Conclusion("a", "low"),)),
@@ -191,7 +200,8 @@ def test_mistakes_name_the_block_of_a_rule() -> None:
 
 
 def test_an_operator_is_needed_where_it_is_used() -> None:
-    both = And((Proposition("a", ("low",)), Not(Or((Proposition("a", ("low",)),)))))
+    low = Proposition("a", ("low",))
+    both = And((low, Not(Or((low, low)))))
     block = RuleBlock((replace(RULE, when=both),), None, None)
     assert [text for _, text in mistakes(blocks=(block,))] == [
         "rule 1: it needs a conjunction, and its block has none",

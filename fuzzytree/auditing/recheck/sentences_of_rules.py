@@ -127,11 +127,9 @@ class _Words:
             return Joint("not", (self.joined("part", level + 1),))
         if not self.takes("("):
             return self.proposition()
-        word = self.takes("and", "or")
-        inner = "part" if word else "or"
-        result = self.joined(inner, level + 1)
+        result = self.joined("or", level + 1)
         self.needs(")")
-        return Joint(word, (result,)) if word else result
+        return result
 
 
 def read_condition(sentences: Sequence[str]) -> Condition | None:

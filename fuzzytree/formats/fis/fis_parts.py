@@ -28,7 +28,6 @@ from fuzzytree.formats.text_files import (
 from fuzzytree.model import (
     And,
     Conclusion,
-    Condition,
     Curve,
     Formula,
     Hedge,
@@ -42,6 +41,7 @@ from fuzzytree.model import (
     SystemRule,
     Term,
     Variable,
+    combined,
     name_choice,
     numbered,
 )
@@ -495,9 +495,7 @@ def _rules(
     if not questions and dialect == "octave":
         what = f"rule {number} has no antecedent and always fires; Octave cannot run it"
         notes.remark(what)
-    when: Condition | None = questions[0] if questions else None
-    if len(questions) > 1:
-        when = Or(tuple(questions)) if is_or else And(tuple(questions))
+    when = combined(Or if is_or else And, questions) if questions else None
     if dialect == "octave" and any(one.hedges for one in conclusions):
         for one in conclusions:
             yield SystemRule(when, (one,), line.weight)

@@ -24,6 +24,7 @@ from fuzzytree.model import (
     SystemOutput,
     SystemRule,
     TNorm,
+    combined,
     name_choice,
 )
 
@@ -190,8 +191,7 @@ def _rule(
             element.position, f"the connector is and or or, not {connector[:20]!r}"
         )
         return None
-    joined = (Or if connector == "or" else And)(tuple(parts))
-    when: Condition = parts[0] if len(parts) == 1 else joined
+    when = combined(Or if connector == "or" else And, parts)
     own = None if len(parts) == 1 else connector
     norms = _with_inner(norms, own, inner, notes)
     return SystemRule(when, tuple(results), weight, name), norms

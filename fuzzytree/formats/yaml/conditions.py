@@ -5,8 +5,7 @@ than OR, and `speed is slow or fast` is one proposition. A name may have several
 one with a word of the language in it, such as `and` or `very`, or with signs that would
 end it, stands in quotes, where a quote is written twice. Between a variable and its
 term stand hedges, the words of a hedge joined by `-`. `not (...)` takes the opposite of
-a condition, and `(and a is b)` is an AND of one part. A rule has a list of conditions,
-all of which must hold.
+a condition. A rule has a list of conditions, all of which must hold.
 """
 
 from __future__ import annotations
@@ -32,6 +31,8 @@ from fuzzytree.model import (
     SNorm,
     SystemRule,
     TNorm,
+    combined,
+    condition_text,
 )
 
 HEDGES: Final[Mapping[str, Hedge]] = {
@@ -116,30 +117,16 @@ def condition_texts(condition: Condition | None) -> list[str]:
         ...     Proposition("is it", ("so", "so-so"), ("very",)))))
         ['wall is near', '"is it" is very so or so-so']
     """
-    if isinstance(condition, And) and len(condition.parts) > 1:
-        return [*map(condition_text, condition.parts)]
-    return [] if condition is None else [condition_text(condition)]
+    if isinstance(condition, And):
+        return [*map(condition_sentence, condition.parts)]
+    return [] if condition is None else [condition_sentence(condition)]
 
 
-def condition_text(condition: Condition) -> str:
+def condition_sentence(condition: Condition) -> str:
     """Return the sentence of a condition; `parse_condition` gives back an equal one."""
-    match condition:
-        case Proposition(variable=variable, terms=terms, hedges=hedges):
-            return _proposition(variable, terms, hedges)
-        case Not(part=part):
-            return f"not ({condition_text(part)})"
-        case And(parts=parts) | Or(parts=parts):
-            word = "and" if isinstance(condition, And) else "or"
-            inner = (And, Or) if word == "and" or len(parts) == 1 else (Or,)
-            texts = [
-                f"({condition_text(part)})"
-                if isinstance(part, inner) and len(part.parts) > 1
-                else condition_text(part)
-                for part in parts
-            ]
-            if len(parts) == 1:
-                return f"({word} {texts[0]})"
-            return f" {word} ".join(texts)
+    return condition_text(
+        condition, lambda one: _proposition(one.variable, one.terms, one.hedges)
+    )
 
 
 def conclusions_text(conclusions: tuple[Conclusion, ...]) -> str:
@@ -213,14 +200,14 @@ class _Sentence:
         parts = [self.conjunction(level)]
         while self.takes("or"):
             parts.append(self.conjunction(level))
-        return parts[0] if len(parts) == 1 else Or(tuple(parts))
+        return combined(Or, parts)
 
     def conjunction(self, level: int) -> Condition:
         """Read parts that are joined by AND."""
         parts = [self.part(level)]
         while self.takes("and"):
             parts.append(self.part(level))
-        return parts[0] if len(parts) == 1 else And(tuple(parts))
+        return combined(And, parts)
 
     def part(self, level: int) -> Condition:
         """Read a proposition, or a condition in parentheses."""
@@ -231,12 +218,11 @@ class _Sentence:
         if not self.next.is_sign("("):
             return self.question()
         self.place += 1
-        kind = And if self.takes("and") else Or if self.takes("or") else None
-        result = self.condition(level + 1) if kind is None else self.part(level + 1)
+        result = self.condition(level + 1)
         if not self.next.is_sign(")"):
-            raise self.unexpected("')'" if kind else "'and', 'or' or ')'")
+            raise self.unexpected("'and', 'or' or ')'")
         self.place += 1
-        return result if kind is None else kind((result,))
+        return result
 
     def question(self) -> Proposition:
         """Read `variable is hedge ... term or term`."""

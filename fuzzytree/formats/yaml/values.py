@@ -47,6 +47,7 @@ from fuzzytree.model import (
     Term,
     Trapezoid,
     Variable,
+    combined,
 )
 
 
@@ -221,7 +222,7 @@ def system_rule(
     if one is None or len(mistakes) >= MOST_SHOWN:
         return None
     parts = conditions(path, one.if_, known, mistakes)
-    when = And(tuple(parts)) if len(parts) > 1 else parts[0] if parts else None
+    when = combined(And, parts) if parts else None
     try:
         then = parse_conclusions(one.then)
     except SentenceError as error:

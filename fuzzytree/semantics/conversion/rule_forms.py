@@ -27,6 +27,7 @@ from fuzzytree.model import (
     Proposition,
     RuleBlock,
     SystemRule,
+    combined,
     questions,
 )
 
@@ -136,8 +137,8 @@ def split(
         >>> from fuzzytree.model import Conclusion
         >>> a, b, c = (Proposition(name, ("x",)) for name in "abc")
         >>> both = And((a, Or((b, c))))
-        >>> [len(one.parts) for one in alternatives(both)]
-        [2, 2]
+        >>> alternatives(both) == [And((a, b)), And((a, c))]
+        True
     """
     outputs = {one.name: one for one in system.outputs}
     is_monotone = (
@@ -158,12 +159,12 @@ def split(
     return tuple(replace(rule, when=when) for when in result)
 
 
-def alternatives(condition: Condition) -> list[And]:
+def alternatives(condition: Condition) -> list[Condition]:
     """Return what may hold for a condition to hold, an and of questions each.
 
     At most one more than `MOST_RULES`.
     """
-    return [And(parts) for parts in _alternatives(condition, 0)]
+    return [combined(And, parts) for parts in _alternatives(condition, 0)]
 
 
 def _alternatives(condition: Condition, nots: int) -> list[tuple[Condition, ...]]:

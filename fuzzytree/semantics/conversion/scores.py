@@ -60,6 +60,7 @@ from fuzzytree.model import (
     Term,
     TNorm,
     Variable,
+    combined,
     questions,
     unlike,
 )
@@ -326,9 +327,7 @@ def _conditions(rules: RuleBase, tautology: Condition | None) -> list[Condition 
                     proposition, is_product=is_product
                 )
             parts += known[id(proposition)]
-        results.append(
-            And(tuple(parts)) if len(parts) > 1 else parts[0] if parts else tautology
-        )
+        results.append(combined(And, parts) if parts else tautology)
     return results
 
 
@@ -338,8 +337,7 @@ def _proposition(
     """Return what a proposition becomes: conditions that are joined by AND."""
     variable, terms = proposition.variable, proposition.terms
     if not proposition.negated:
-        propositions = tuple(Proposition(variable, (term,)) for term in terms)
-        return propositions if len(propositions) == 1 else (Or(propositions),)
+        return (combined(Or, (Proposition(variable, (term,)) for term in terms)),)
     if len(terms) == 1 or not is_product:  # 1 - max = min of 1 - each, exactly
         return tuple(Proposition(variable, (term,), ("not",)) for term in terms)
     return (Not(Or(tuple(Proposition(variable, (term,)) for term in terms))),)
@@ -411,7 +409,7 @@ def _any_of(
     ]
     if len(propositions) < len(conditions) or not propositions:
         return tautology
-    return Or(tuple(propositions)) if len(propositions) > 1 else propositions[0]
+    return combined(Or, propositions)
 
 
 def _block(
