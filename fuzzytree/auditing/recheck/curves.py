@@ -13,7 +13,6 @@ from bisect import bisect_left
 from collections.abc import Callable
 from decimal import Context, Decimal
 from fractions import Fraction
-from typing import Any
 
 from fuzzytree.auditing.recheck.models import ONE, ZERO, Curve
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
@@ -51,7 +50,7 @@ def knots(curve: Curve) -> list[Fraction]:
         ]
     if curve.kind == "trapezoid" and n[0] is not None and n[0] == n[1]:
         ends.append(Fraction(math.nextafter(n[1], -math.inf)))  # 1 from there on
-    if curve.kind == "pi" or curve.kind == "s":
+    if curve.kind in ("pi", "s", "semi ellipse"):
         ends += [(a + b) / 2 for a, b in zip(ends[::2], ends[1::2], strict=True)]
     return sorted({*ends})
 
@@ -115,99 +114,29 @@ def _line(x: Fraction, ends: tuple[float, ...], degrees: tuple[float, ...]) -> F
 
 
 def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
-    n: list[Any] = [Fraction(o) if isinstance(o, float) else o for o in curve.numbers]
-    match curve.kind:
-        case "lr":
-            return _both(
-                min,
-                _side(n[0] - high, n[0] - low, n[1]),
-                _side(low - n[0], high - n[0], n[2]),
-            )
-        case "gaussian":
-            return _bell(low - n[0], high - n[0], n[1])
-        case "two gaussians":
-            left = _bell(min(low - n[0], ZERO), min(high - n[0], ZERO), n[1])
-            right = _bell(max(low - n[2], ZERO), max(high - n[2], ZERO), n[3])
-            return left[0] * right[0], left[1] * right[1]
-        case "bell":
-            near, far = _sizes(low - n[0], high - n[0])
-            ends = [
-                _logistic(-2 * n[2] * _ln(x / n[1])[k])
-                if x
-                else ((ONE, ONE) if n[2] > 0 else (ZERO, ZERO))
-                for k, x in enumerate((near, far))
-            ]
-            more = [
-                _logistic(-2 * n[2] * _ln(x / n[1])[1 - k]) if x else ends[k]
-                for k, x in enumerate((near, far))
-            ]
-            every = [end for one in (*ends, *more) for end in one]
-            return min(every), max(every)
-        case "sigmoid":
-            ends = [_logistic(n[1] * (x - n[0])) for x in (low, high)]
-            return min(a for a, _ in ends), max(b for _, b in ends)
-        case "sigmoid product" | "sigmoid difference":
-            a, b = (
-                _enclosed(Curve("sigmoid", one), low, high) for one in curve.numbers
-            )
-            if curve.kind == "sigmoid product":
-                return a[0] * b[0], a[1] * b[1]
-            least, most = a[0] - b[1], a[1] - b[0]
-            return max(least, -most, ZERO), max(abs(least), abs(most))
-        case "cosine":
-            near, far = (
-                min(x / n[1], Fraction(1, 2)) for x in _sizes(low - n[0], high - n[0])
-            )
-            least, most = _cosine(far)[0], _cosine(near)[1]
-            is_out = [2 * x >= 1 for x in (far, near)]
-            least, most = (
-                ZERO if out else (1 + one) / 2
-                for out, one in zip(is_out, (least, most), strict=True)
-            )
-            return least, most
-        case "spike":
-            near, far = _sizes(low - n[0], high - n[0])
-            return _falling(10 * far / n[1])[0], _falling(10 * near / n[1])[1]
-        case "concave":
-            wide = n[1] - n[0]
-            ends2 = [
-                abs(wide)
-                / (abs(wide) + max((n[1] - x) * (1 if wide >= 0 else -1), ZERO))
-                if wide or n[1] != x
-                else ONE
-                for x in (low, high)
-            ]
-            return min(ends2), max(ends2)
-        case "arc":
-            us = [min(max((x - n[0]) / (n[1] - n[0]), ZERO), ONE) for x in (low, high)]
-            return _root(min(us) * (2 - min(us)))[0], _root(max(us) * (2 - max(us)))[1]
-        case "semi ellipse":
-            middle, half = (n[0] + n[1]) / 2, (n[1] - n[0]) / 2
-            near, far = (
-                min(x / half, ONE) for x in _sizes(low - middle, high - middle)
-            )
-            return _root(1 - far * far)[0], _root(1 - near * near)[1]
-        case "s":
-            ends2 = [_s(x, n[0], n[1]) for x in (low, high)]
-            return min(ends2), max(ends2)
-        case "pi":
-            rise, fall = (
-                [_s(x, n[0], n[1]) for x in (low, high)],
-                [_s(x, n[3], n[2]) for x in (low, high)],
-            )
-            return min(rise) * min(fall), max(rise) * max(fall)
-        case _:
-            raise UndecidedError(f"a curve ({curve.kind}) is not evaluated here")
+    """Return the degrees of a curve that is no line.
 
-
-def _both(choose: Callable[..., Fraction], one: Between, other: Between) -> Between:
-    return choose(one[0], other[0]), choose(one[1], other[1])
-
-
-def _sizes(low: Fraction, high: Fraction) -> Between:
-    """Return the least and the largest size of the numbers of an interval."""
-    ends = abs(low), abs(high)
-    return ZERO if low <= 0 <= high else min(ends), max(ends)
+    All but LR sets are monotone between the places where they turn, or are two curves
+    that are.
+    """
+    n = curve.numbers
+    if curve.kind == "lr":
+        mean = Fraction(n[0])
+        left = _side(mean - high, mean - low, n[1])
+        right = _side(low - mean, high - mean, n[2])
+        return min(left[0], right[0]), min(left[1], right[1])
+    if curve.kind in PAIRS:
+        a, b = (_enclosed(one, low, high) for one in PAIRS[curve.kind](*n))
+        if curve.kind != "sigmoid difference":
+            return a[0] * b[0], a[1] * b[1]
+        least, most = a[0] - b[1], a[1] - b[0]
+        return max(least, -most, ZERO), max(abs(least), abs(most))
+    if curve.kind not in DEGREES:
+        raise UndecidedError(f"a curve ({curve.kind}) is not evaluated here")
+    turns = [x for x in knots(curve) if low < x < high]
+    numbers = [*map(Fraction, n)]
+    ends = [DEGREES[curve.kind](x, *numbers) for x in (low, *turns, high)]
+    return min(one for one, _ in ends), max(one for _, one in ends)
 
 
 def _side(
@@ -299,10 +228,11 @@ def _power(x: Fraction, power: Fraction) -> Between:
     return _falling(-low * power)[0], min(_falling(-high * power)[1], ONE)
 
 
-def _bell(low: Fraction, high: Fraction, deviation: Fraction) -> Between:
-    near, far = _sizes(low, high)
-    ends = [(x / deviation) ** 2 / 2 for x in (far, near)]
-    return _falling(ends[0])[0], _falling(ends[1])[1]
+def _bell(x: Fraction, center: Fraction, width: Fraction, slope: Fraction) -> Between:
+    if x == center:
+        return (ONE, ONE) if slope > 0 else (ZERO, ZERO)
+    ends = [-2 * slope * one for one in _ln(abs(x - center) / width)]
+    return _logistic(min(ends))[0], _logistic(max(ends))[1]
 
 
 def _logistic(z: Fraction) -> Between:
@@ -315,8 +245,11 @@ def _logistic(z: Fraction) -> Between:
     )
 
 
-def _cosine(turns: Fraction) -> Between:
-    """Return between which numbers cos(2 pi t) lies, 0 <= t <= 1/2."""
+def _cosine(x: Fraction, center: Fraction, width: Fraction) -> Between:
+    """Return between which numbers (1 + cos(2 pi (x - center) / width)) / 2 lies."""
+    turns = abs(x - center) / width
+    if 2 * turns >= 1:
+        return ZERO, ZERO
     square, low, high = (2 * turns * _PI) ** 2, -ONE, ONE
     for place in range(59, 0, -2):
         step = square / (place * (place + 1))
@@ -324,7 +257,55 @@ def _cosine(turns: Fraction) -> Between:
         low, high = (Fraction(math.floor(end * 2**160), 2**160) for end in ends)
         high += Fraction(1, 2**160)
     off = Fraction(1, 10**40)  # of the digits of pi
-    return max(low - off, -ONE), min(high + off, ONE)
+    return (1 + max(low - off, -ONE)) / 2, (1 + min(high + off, ONE)) / 2
+
+
+def _concave(x: Fraction, inflection: Fraction, end: Fraction) -> Between:
+    wide, sign = abs(end - inflection), 1 if end >= inflection else -1
+    far = wide + max((end - x) * sign, ZERO)
+    return (wide / far, wide / far) if far else (ONE, ONE)
+
+
+def _arc(x: Fraction, start: Fraction, end: Fraction) -> Between:
+    u = min(max((x - start) / (end - start), ZERO), ONE)
+    return _root(u * (2 - u))
+
+
+def _semi_ellipse(x: Fraction, start: Fraction, end: Fraction) -> Between:
+    u = min(abs(2 * x - start - end) / abs(end - start), ONE)
+    return _root(1 - u * u)
+
+
+DEGREES: dict[str, Callable[..., Between]] = {
+    "gaussian": lambda x, mean, deviation: _falling(((x - mean) / deviation) ** 2 / 2),
+    "left half": lambda x, mean, d: _falling((min(x - mean, ZERO) / d) ** 2 / 2),
+    "right half": lambda x, mean, d: _falling((max(x - mean, ZERO) / d) ** 2 / 2),
+    "sigmoid": lambda x, inflection, slope: _logistic(slope * (x - inflection)),
+    "spike": lambda x, center, width: _falling(10 * abs(x - center) / width),
+    "s": lambda x, start, end: (_s(x, start, end), _s(x, start, end)),
+    "bell": _bell,
+    "cosine": _cosine,
+    "concave": _concave,
+    "arc": _arc,
+    "semi ellipse": _semi_ellipse,
+}
+"""Between which numbers a degree lies at a point."""
+
+
+def _sigmoids(*both: tuple[float, ...]) -> list[Curve]:
+    return [Curve("sigmoid", one) for one in both]
+
+
+PAIRS: dict[str, Callable[..., list[Curve]]] = {
+    "two gaussians": lambda a, p, b, q: [
+        Curve("left half", (a, p)),
+        Curve("right half", (b, q)),
+    ],
+    "pi": lambda a, b, c, d: [Curve("s", (a, b)), Curve("s", (d, c))],
+    "sigmoid product": _sigmoids,
+    "sigmoid difference": _sigmoids,
+}
+"""Curves that are a product, or a difference, of two others."""
 
 
 _HEDGES: dict[str, Callable[[Fraction], Between]] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 
@@ -702,62 +703,20 @@ def size(case: Case, answer: Answer) -> None:
         counted(answer, depth_of_the_tree=max(map(len, case.model.paths)))
     if not any(one.name == "index of Nauck" for one in answer.measures):
         return
-    names = [name for name in case.rules.variables if any(v == name for v, _ in used)]
+    names = {variable for variable, _ in used}
+    terms = Counter(v.name for v, *_ in plain_terms(case))
+    shares = [Fraction(1, max(terms[name] - 1, 1)) for name in names]
     complexity = Fraction(
-        case.model.class_count,
-        sum(len({c.variable for c in when}) for when in propositions),
+        case.model.class_count, sum(len({c.variable for c in w}) for w in propositions)
     )
-    low = high = partition = ZERO
-    for name in names:
-        count, ends = coverage(case, case.model.variables[name])
-        low, high = low + ends[0] / len(names), high + ends[1] / len(names)
-        partition += Fraction(1, max(count - 1, 1)) / len(names)
-    for name, least, most in (
-        ("complexity", complexity, complexity),
-        ("coverage", low, high),
-        ("partition", partition, partition),
-    ):
-        near(answer.measure(f"{name} of Nauck"), least, most, name)
-    whole = complexity * partition
-    near(answer.measure("index of Nauck"), whole * low, whole * high, "the index")
-
-
-def coverage(case: Case, variable: Variable) -> tuple[int, Interval]:
-    """Return how many terms a variable has, and how well they cover its range.
-
-    With the sum s of the degrees of p terms: the mean of s up to 1, (p - s) / (p - 1)
-    beyond.
-    """
-    terms = [t for v, t, _ in plain_terms(case) if v.name == variable.name]
-    axis, count = axis_of(case, variable, terms), len(terms)
-    curves = [axis.number_of(Proposition(variable.name, (term,))) for term in terms]
-    totals = [ZERO, ZERO]
-
-    def covers(s: Fraction) -> Fraction:
-        return s if s <= 1 or count == 1 else (count - s) / (count - 1)
-
-    for cell in axis.cells:
-        sums = [
-            [sum((lines[n][k] for n in curves), start=ZERO) for k in (0, 1)]
-            for lines in (cell.lower, cell.upper)
-        ]
-        width = cell.high - cell.low
-        if sums[0] == sums[1]:
-            (a, b), ends = sums[0], [ZERO, ONE]
-            if (a - 1) * (b - 1) < 0:
-                ends.insert(1, (1 - a) / (b - a))
-            values = [covers(a + u * (b - a)) for u in ends]
-            pairs = zip(
-                itertools.pairwise(ends), itertools.pairwise(values), strict=True
-            )
-            area = sum(((v - u) * (p + q) / 2 for (u, v), (p, q) in pairs), start=ZERO)
-            totals = [total + width * area for total in totals]
-            continue
-        every = [*map(covers, (*sums[0], *sums[1]))]
-        most = ONE if min(sums[0]) <= 1 <= max(sums[1]) else max(every)
-        totals = [totals[0] + width * min(every), totals[1] + width * most]
-    low, high = case.ends(variable)
-    return count, (totals[0] / (high - low), min(totals[1] / (high - low), ONE))
+    whole = complexity * sum(shares, start=ZERO) / len(shares)
+    factors = [answer.measure(f"{one} of Nauck") for one in ("complexity", "coverage")]
+    near(factors[0], complexity, complexity, "complexity")
+    # how well terms cover their range is not integrated again
+    product = whole * Fraction(factors[1])
+    near(answer.measure("index of Nauck"), product, product, "the index")
+    partition = whole / complexity
+    near(answer.measure("partition of Nauck"), partition, partition, "partition")
 
 
 PROOFS: dict[str, Callable[[Case, Answer], None]] = {

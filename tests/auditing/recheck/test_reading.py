@@ -12,13 +12,15 @@ from fuzzytree.auditing.engine import states
 from fuzzytree.auditing.findings.records import LIMITS, Audit, AuditAnswer
 from fuzzytree.auditing.recheck import CannotRunError, checks, records
 from fuzzytree.auditing.recheck.case import strengths
+from fuzzytree.auditing.recheck.curves import bounds, is_straight, knots
 from fuzzytree.auditing.recheck.models import Model
 from fuzzytree.auditing.recheck.records import built, read_json
 from fuzzytree.auditing.recheck.yaml import read_yaml
 from fuzzytree.exporters import yaml
 from fuzzytree.numerics import decide
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.testing import random_tree
+from fuzzytree.semantics.programs.operations import Doubles
+from fuzzytree.testing import random_system, random_tree
 from tests.auditing.engine.bases import random_base
 
 
@@ -157,3 +159,21 @@ def test_a_file_of_another_format_is_refused_with_the_conversion() -> None:
         "brake.fcl:1: no key and no list: 'FUNCTION_BLOCK brake'; only YAML is read "
         "here: convert it (fuzzytree convert), and audit that"
     )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_degrees_lie_in_what_encloses_them(seed: int) -> None:
+    system, chance = random_system(seed, formulas="none"), random.Random(seed)
+    found = Model(yaml.write(system).content, "x.yaml")
+    for variable in system.variables:
+        for term in variable.terms:
+            curve = found.variables[variable.name].curves[term.name]
+            places = [float(x) for x in knots(curve)] or [0.0]
+            for _ in range(10):
+                ends = min(places) - 1.0, max(places) + 1.0
+                a, b = sorted(chance.uniform(*ends) for _ in range(2))
+                b = a if is_straight(curve) else b
+                low, high = bounds(curve, Fraction(a), Fraction(b))
+                for x in (a, b, *(one for one in places if a < one < b)):
+                    degree = term.height * term.function.degree(Doubles(), x)
+                    assert low - 1e-12 <= degree <= high + 1e-12, (curve, x)
