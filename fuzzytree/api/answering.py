@@ -247,7 +247,12 @@ def _answering_numbers(
 ) -> Answering:
     def answer(values: FloatArray) -> Outputs:
         outcome = execute(np.ascontiguousarray(values))
-        return Outputs(names, outcome.outputs, outcome.status, outcome.activations)
+        return Outputs(
+            names,
+            outcome.outputs,
+            status=outcome.status,
+            strengths=outcome.activations,
+        )
 
     return Answering(inputs, trained, answer, is_parallel)
 
@@ -273,7 +278,7 @@ def _answering_onnx(
             model.classes,
             np.array([position.get(name, -1) for name in labels], np.int64),
             outcome.rule,
-            outcome.status,
+            status=outcome.status,
             strengths=outcome.strengths if with_strengths else None,
             label_type=model.semantics.label_type,
         )

@@ -210,14 +210,9 @@ def _few_lines(
 def _answered(
     answers: Predictions | Outputs, options: RunOptions, *, as_arrow: bool
 ) -> Columns:
-    from fuzzytree.runtimes import Outputs
-
     columns: Any = answers.to_arrow if as_arrow else answers.columns
     try:
-        if isinstance(answers, Outputs):
-            result = columns(with_activations=options.strengths is not None)
-        else:
-            result = columns(options.strengths)
+        result = columns(options.strengths)
     except ValueError as error:
         raise click.UsageError(
             f"--strengths {options.strengths}: {options.model} does not report them; "

@@ -308,9 +308,9 @@ def _summands(parts: Sequence[Part]) -> Iterator[str]:
 def system_reasons(system: FuzzySystem, outputs: Outputs) -> list[str]:
     """Return, for each row, the rules that were activated, each with its degree."""
     texts = [rule_text(rule) for rule in system.rules]
-    if outputs.activations is None:
+    if outputs.strengths is None:
         return [""] * len(outputs)
-    rows = zip(outputs.activations.T.tolist(), outputs.status.tolist(), strict=True)
+    rows = zip(outputs.strengths.T.tolist(), outputs.status.tolist(), strict=True)
     return [_reason(texts, degrees, status) for degrees, status in rows]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, TypeVar
 
 import msgspec
@@ -38,31 +38,134 @@ S = TypeVar("S", bound=msgspec.Struct)
 _WORDS = [status.name.lower() for status in Status]
 
 
-class Predictions(msgspec.Struct, frozen=True, eq=False):
+class Answers(msgspec.Struct, frozen=True, eq=False, kw_only=True):
+    """What a model answers for some rows.
+
+    Attributes:
+        status: A `fuzzytree.semantics.reference.Status` for each row.
+        strengths: Of each rule, shape (rules, rows), NaN in rows with missing values;
+            None if they were not requested or if only one path of a tree was followed.
+    """
+
+    status: IntArray
+    strengths: FloatArray | None = None
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.status)
+
+    def count(self, status: int) -> int:
+        """Return how many rows have this `fuzzytree.semantics.reference.Status`."""
+        return int(np.count_nonzero(self.status == status))
+
+    def to_csv(self, strengths: By | None = None) -> str:
+        """Return them as CSV: the answers, the status and, if requested, strengths.
+
+        No class, no number and an unknown strength are empty cells.
+
+        Raises:
+            ValueError: If strengths are requested that are not there.
+        """
+        columns = self.columns(strengths)
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+        return text.getvalue()
+
+    def columns(self, strengths: By | None = None) -> dict[str, Sequence[object]]:
+        """Return the columns that `to_csv` writes, by name.
+
+        Raises:
+            ValueError: If strengths are requested that are not there.
+        """
+        result = self._answers()
+        result[_status_title(result)] = [_WORDS[one] for one in self.status.tolist()]
+        return result | {k: _cells(row) for k, row in self._rows(strengths).items()}
+
+    def to_arrow(self, strengths: By | None = None) -> pa.Table:
+        """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
+
+        Classes are of the type of `classes`, rules int32, the status a dictionary of
+        text, numbers and strengths float64; what would be an empty cell is null.
+
+        Raises:
+            ValueError: If strengths are requested that are not there.
+        """
+        import pyarrow as pa
+
+        result = self._arrays()
+        status = pa.DictionaryArray.from_arrays(self.status.astype(np.int8), _WORDS)
+        result[_status_title(result)] = status
+        for name, row in self._rows(strengths).items():
+            result[name] = pa.array(row, from_pandas=True)  # NaN is null
+        return pa.table(result)
+
+    def to_pandas(self, strengths: By | None = None) -> pd.DataFrame:
+        """Return the columns of `to_csv` as a frame of pandas; needs pandas.
+
+        Classes are of the type of `classes`.
+
+        Raises:
+            ValueError: If strengths are requested that are not there.
+        """
+        return pandas_frame(self.columns(strengths))
+
+    def _answers(self) -> dict[str, Sequence[object]]:
+        """Return the columns of the answers alone."""
+        raise NotImplementedError
+
+    def _arrays(self) -> dict[str, pa.Array]:
+        """Return the same as arrays of pyarrow."""
+        raise NotImplementedError
+
+    def _rows(self, strengths: By | None) -> dict[str, FloatArray]:
+        """Return a row of strengths for each rule or class, by the title of each."""
+        if strengths is None:
+            return {}
+        values = self.strengths
+        if values is None or strengths == "class":
+            raise ValueError(
+                f"there are no strengths by {strengths}: "
+                "rules have them, and a tree follows one path"
+            )
+        return {f"strength of rule {k}": row for k, row in enumerate(values, 1)}
+
+    def _unusual(self) -> list[str]:
+        """Return the counts of ties, uncovered and missing rows that are not 0."""
+        names = {
+            Status.TIE: "decided by the order of the rules",
+            Status.UNCOVERED: "uncovered",
+            Status.MISSING: "with missing values",
+        }
+        counts = {text: self.count(status) for status, text in names.items()}
+        return [f"{count} {text}" for text, count in counts.items() if count]
+
+
+def _status_title(taken: Collection[str]) -> str:
+    """Return `status`, or what it is called where an output has that name."""
+    title = "status"
+    while title in taken:
+        title += "_"
+    return title
+
+
+class Predictions(Answers, frozen=True, eq=False):
     """The classes that a model predicts for some rows.
 
     Attributes:
         choices: The classes that the model can predict.
         codes: The position in `choices` of each row's class; -1 for no class.
         rule: The number of the winning rule or leaf of each row, from 1; 0 for none.
-        status: A `fuzzytree.semantics.reference.Status` for each row.
         owners: The position in `choices` of each rule's class; empty if not known.
-        strengths: Shape (rules, rows), NaN in rows with missing values; None if they
-            were not requested or if only one path of a tree was followed.
         label_type: What the names of classes stand for, if not text.
     """
 
     choices: tuple[str, ...]
     codes: IntArray
     rule: IntArray
-    status: IntArray
     owners: tuple[int, ...] = ()
-    strengths: FloatArray | None = None
     label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
-
-    def __len__(self) -> int:
-        """Return the number of rows."""
-        return len(self.codes)
 
     @property
     def classes(self) -> list[Label | None]:
@@ -95,74 +198,11 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
         ]
         return np.array(result)
 
-    def count(self, status: int) -> int:
-        """Return how many rows have this `fuzzytree.semantics.reference.Status`."""
-        return int(np.count_nonzero(self.status == status))
-
     def class_counts(self) -> dict[str, int]:
         """Return how many rows have each class, and `no class` if any has none."""
         counts = np.bincount(self.codes + 1, minlength=len(self.choices) + 1).tolist()
         result = dict(zip(self.choices, counts[1:], strict=True))
         return result | ({"no class": counts[0]} if counts[0] else {})
-
-    def to_csv(self, strengths: By | None = None) -> str:
-        """Return them as CSV: class, rule, status and, if requested, strengths.
-
-        No class and an unknown strength are empty cells.
-
-        Raises:
-            ValueError: If strengths are requested that are not there.
-        """
-        return _csv_text(self.columns(strengths))
-
-    def columns(self, strengths: By | None = None) -> dict[str, Sequence[object]]:
-        """Return the columns that `to_csv` writes, by name.
-
-        Raises:
-            ValueError: If strengths are requested that are not there.
-        """
-        result: dict[str, Sequence[object]] = {
-            "class": [name or "" for name in self.names],
-            "rule": self.rule.tolist(),
-            "status": [_WORDS[status] for status in self.status.tolist()],
-        }
-        strength_rows = self._strengths(strengths)
-        return result | {name: _cells(row) for name, row in strength_rows.items()}
-
-    def _strengths(self, strengths: By | None) -> dict[str, FloatArray]:
-        if strengths is None:
-            return {}
-        values = self.class_strengths if strengths == "class" else self.strengths
-        if values is None:
-            raise ValueError(
-                f"there are no strengths by {strengths}: "
-                "rules have them, and a tree follows one path"
-            )
-        names = self.choices if strengths == "class" else range(1, len(values) + 1)
-        titles = [f"strength of {strengths} {name}" for name in names]
-        return dict(zip(titles, values, strict=True))
-
-    def to_arrow(self, strengths: By | None = None) -> pa.Table:
-        """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
-
-        Classes are of the type of `classes`, rules int32, the status a dictionary of
-        text, strengths float64; what would be an empty cell is null.
-
-        Raises:
-            ValueError: If strengths are requested that are not there.
-        """
-        import pyarrow as pa
-
-        labels = pa.array([label_of(name, self.label_type) for name in self.choices])
-        codes = pa.array(self.codes, mask=self.codes < 0)
-        result = {
-            "class": labels.take(codes),
-            "rule": pa.array(self.rule, pa.int32()),
-            "status": _arrow_status(self.status),
-        }
-        for name, row in self._strengths(strengths).items():
-            result[name] = pa.array(row, from_pandas=True)  # NaN is null
-        return pa.table(result)
 
     def to_pandas(self, strengths: By | None = None) -> pd.DataFrame:
         """Return the columns of `to_csv` as a frame of pandas; needs pandas.
@@ -174,6 +214,24 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
         """
         return pandas_frame({**self.columns(strengths), "class": self.classes})
 
+    def _answers(self) -> dict[str, Sequence[object]]:
+        names = [name or "" for name in self.names]
+        return {"class": names, "rule": self.rule.tolist()}
+
+    def _arrays(self) -> dict[str, pa.Array]:
+        import pyarrow as pa
+
+        labels = pa.array([label_of(name, self.label_type) for name in self.choices])
+        codes = pa.array(self.codes, mask=self.codes < 0)
+        return {"class": labels.take(codes), "rule": pa.array(self.rule, pa.int32())}
+
+    def _rows(self, strengths: By | None) -> dict[str, FloatArray]:
+        values = self.class_strengths if strengths == "class" else None
+        if values is None:
+            return super()._rows(strengths)
+        titles = [f"strength of class {name}" for name in self.choices]
+        return dict(zip(titles, values, strict=True))
+
     def __repr__(self) -> str:
         """Show how many rows there are; `str` shows how many rows got which class."""
         return summary("Predictions", rows=len(self), classes=len(self.choices))
@@ -182,27 +240,8 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
         """Show how many rows got which class, and what was out of the ordinary."""
         result = self.class_counts().items()
         counts = ", ".join(f"{name} {count}" for name, count in result)
-        unusual = ", ".join(_unusual(self))
+        unusual = ", ".join(self._unusual())
         return f"{len(self)} rows: {counts}" + (f"; {unusual}" if unusual else "")
-
-
-def _csv_text(columns: Mapping[str, Sequence[object]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    return text.getvalue()
-
-
-def _unusual(predictions: Predictions | Outputs) -> list[str]:
-    """Return the counts of ties, uncovered and missing rows that are not 0."""
-    names = {
-        Status.TIE: "decided by the order of the rules",
-        Status.UNCOVERED: "uncovered",
-        Status.MISSING: "with missing values",
-    }
-    counts = {text: predictions.count(status) for status, text in names.items()}
-    return [f"{count} {text}" for text, count in counts.items() if count]
 
 
 def joined(parts: Sequence[S]) -> S:
@@ -242,10 +281,10 @@ def predictions_of(
         model.classes,
         codes,
         outcome.rule,
-        outcome.status,
         owners,
-        outcome.strengths if with_strengths else None,
         semantics.label_type,
+        status=outcome.status,
+        strengths=outcome.strengths if with_strengths else None,
     )
 
 
@@ -262,7 +301,8 @@ def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> li
         ...     "grip", ("soft",), (Variable("force", (low,)),),
         ...     (Rule((Proposition("force", ("low",)),), "soft"),),
         ... )
-        >>> found = Predictions(("soft",), np.array([0]), np.array([1]), np.array([0]))
+        >>> one, status = np.array([1]), np.array([0])
+        >>> found = Predictions(("soft",), np.array([0]), one, status=status)
         >>> reasons(rules, np.array([[2.0]]), found)
         ['IF force is low (0.5) THEN soft']
     """
@@ -312,58 +352,25 @@ def _short(degree: float) -> str:
     return "<1" if text == "1" and degree < 1.0 else text
 
 
-class Outputs(msgspec.Struct, frozen=True, eq=False):
+class Outputs(Answers, frozen=True, eq=False):
     """The numbers that a fuzzy system computes for some rows.
+
+    A row is uncovered if an output got no conclusion and has its default; a rule's
+    strength is its degree of activation.
 
     Attributes:
         names: The outputs.
         values: Shape (outputs, rows); NaN where a value is missing, and where no rule
             concludes an output that has no default.
-        status: A `fuzzytree.semantics.reference.Status` for each row: decided;
-            uncovered, if an output got no conclusion and has its default; or
-            missing.
-        activations: The degree of activation of each rule, shape (rules, rows); None
-            if they were not requested.
     """
 
     names: tuple[str, ...]
     values: FloatArray
-    status: IntArray
-    activations: FloatArray | None = None
-
-    def __len__(self) -> int:
-        """Return the number of rows."""
-        return len(self.status)
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return the numbers of an output, one for each row."""
         numbers: FloatArray = self.values[self.names.index(name)]
         return numbers
-
-    def count(self, status: int) -> int:
-        """Return how many rows have this `fuzzytree.semantics.reference.Status`."""
-        return int(np.count_nonzero(self.status == status))
-
-    def columns(self, *, with_activations: bool = False) -> dict[str, Sequence[object]]:
-        """Return the columns that `to_csv` writes, by name.
-
-        Raises:
-            ValueError: If activations are requested that are not there.
-        """
-        result: dict[str, Sequence[object]] = {
-            name: _cells(row) for name, row in zip(self.names, self.values, strict=True)
-        }
-        title = "status"
-        while title in result:  # an output may have that name
-            title += "_"
-        result[title] = [_WORDS[status] for status in self.status.tolist()]
-        if not with_activations:
-            return result
-        if self.activations is None:
-            raise ValueError("there are no degrees of activation; ask for them")
-        for number, row in enumerate(self.activations, 1):
-            result[f"strength of rule {number}"] = _cells(row)
-        return result
 
     def spans(self) -> dict[str, tuple[float, float]]:
         """Return the least and the largest number of each output that has one."""
@@ -377,36 +384,14 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
             if row.size
         }
 
-    def to_csv(self, *, with_activations: bool = False) -> str:
-        """Return the outputs as CSV: each output and the status; NaN is an empty cell.
+    def _answers(self) -> dict[str, Sequence[object]]:
+        return dict(zip(self.names, map(_cells, self.values), strict=True))
 
-        Raises:
-            ValueError: If activations are requested that are not there.
-        """
-        return _csv_text(self.columns(with_activations=with_activations))
-
-    def to_arrow(self, *, with_activations: bool = False) -> pa.Table:
-        """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
-
-        Raises:
-            ValueError: If activations are requested that are not there.
-        """
+    def _arrays(self) -> dict[str, pa.Array]:
         import pyarrow as pa
 
-        titles = self.columns(with_activations=with_activations)
-        activations = () if self.activations is None else self.activations
-        numbers = [*self.values, *activations]
-        rows = [pa.array(row, from_pandas=True) for row in numbers]  # NaN is null
-        rows.insert(len(self.names), _arrow_status(self.status))
-        return pa.table(rows[: len(titles)], [*titles])
-
-    def to_pandas(self, *, with_activations: bool = False) -> pd.DataFrame:
-        """Return the columns of `to_csv` as a frame of pandas; needs pandas.
-
-        Raises:
-            ValueError: If activations are requested that are not there.
-        """
-        return pandas_frame(self.columns(with_activations=with_activations))
+        rows = [pa.array(row, from_pandas=True) for row in self.values]  # NaN is null
+        return dict(zip(self.names, rows, strict=True))
 
     def __repr__(self) -> str:
         """Show how many rows there are; `str` shows the range of each output."""
@@ -419,13 +404,7 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
             f"{name} {low:.6g} to {high:.6g}" for name, (low, high) in result
         )
         spans = f"{len(self)} rows: {spans or 'no number'}"
-        return "; ".join([spans, *_unusual(self)])
-
-
-def _arrow_status(status: IntArray) -> pa.DictionaryArray:
-    import pyarrow as pa
-
-    return pa.DictionaryArray.from_arrays(status.astype(np.int8), _WORDS)
+        return "; ".join([spans, *self._unusual()])
 
 
 def _cells(row: FloatArray) -> list[object]:

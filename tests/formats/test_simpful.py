@@ -112,9 +112,9 @@ def test_a_sugeno_system_answers_as_simpful_does(seed: int) -> None:
     ours = ft.from_simpful(theirs)
     rows = rows_for(ours, 200)
     found = ft.run(ours, rows)
-    assert found.activations is not None
+    assert found.strengths is not None
     # An average passes on what its weights are off, divided by their sum.
-    degrees = np.maximum(found.activations.sum(axis=0), 1e-300)
+    degrees = np.maximum(found.strengths.sum(axis=0), 1e-300)
     allowed = 2 * 12.0 * len(ours.rules) * DEGREE / degrees
     off = np.abs(found["o"] - answers(theirs, rows, ours.inputs))
     assert np.all(off <= allowed)
@@ -128,8 +128,8 @@ def test_a_mamdani_system_answers_as_simpful_does(seed: int) -> None:
     ours = ft.from_simpful(theirs)
     rows = rows_for(ours, 20)
     found = ft.run(ours, rows)
-    assert found.activations is not None
-    highest = np.maximum(found.activations.max(axis=0), 1e-300)
+    assert found.strengths is not None
+    highest = np.maximum(found.strengths.max(axis=0), 1e-300)
     # Two sums of 1,000 numbers, and degrees off by DEGREE at each of them.
     allowed = 2_000 * EPSILON + 1_000 * DEGREE / highest
     off = np.abs(found["o"] - answers(theirs, rows, ours.inputs))
@@ -155,8 +155,8 @@ def test_a_model_of_pyfume_answers_as_pyfume_does(
         for name, value in zip(columns, row, strict=True):
             theirs.set_variable(name, value)
         expected.append(theirs.Sugeno_inference()["OUTPUT"])
-    assert found.activations is not None
-    allowed = 2 * 10.0 * 6 * DEGREE / found.activations.sum(axis=0)
+    assert found.strengths is not None
+    allowed = 2 * 10.0 * 6 * DEGREE / found.strengths.sum(axis=0)
     assert np.all(np.abs(found["OUTPUT"] - expected) <= allowed)
     assert allowed.max() < 1e-9
 

@@ -22,15 +22,15 @@ from fuzzytree.semantics.samples import all_samples
 FOUND = Outputs(
     ("fan", "status"),
     np.array([[1.0, math.nan, 2.5], [0.0, 0.0, math.nan]]),
-    np.array([Status.DECIDED, Status.UNCOVERED, Status.MISSING]),
-    np.array([[0.5, 0.0, math.nan]]),
+    status=np.array([Status.DECIDED, Status.UNCOVERED, Status.MISSING]),
+    strengths=np.array([[0.5, 0.0, math.nan]]),
 )
 TIPPER = Path(__file__).resolve().parents[2] / "examples" / "tipper.fll"
 SYSTEMS = [one for one in all_samples().values() if isinstance(one, FuzzySystem)]
 
 
 def test_no_number_is_an_empty_cell() -> None:
-    assert FOUND.to_csv(with_activations=True) == (
+    assert FOUND.to_csv("rule") == (
         "fan,status,status_,strength of rule 1\n"
         "1.0,0.0,decided,0.5\n"
         ",0.0,uncovered,0.0\n"
@@ -39,7 +39,7 @@ def test_no_number_is_an_empty_cell() -> None:
 
 
 def test_outputs_become_frames_with_nothing_where_there_is_no_number() -> None:
-    frame = FOUND.to_pandas(with_activations=True)
+    frame = FOUND.to_pandas("rule")
     assert frame["fan"].isna().tolist() == [False, True, False]
     assert frame["strength of rule 1"].dtype == np.float64
     assert FOUND.to_arrow().to_pydict() == {
@@ -63,10 +63,10 @@ def test_what_was_out_of_the_ordinary_is_counted() -> None:
 
 
 def test_activations_are_absent_unless_requested() -> None:
-    bare = Outputs(("y",), np.array([[1.0]]), np.array([0]))
-    with pytest.raises(ValueError, match="ask for them"):
-        bare.columns(with_activations=True)
-    assert joined([bare, bare]).activations is None
+    bare = Outputs(("y",), np.array([[1.0]]), status=np.array([0]))
+    with pytest.raises(ValueError, match="there are no strengths by rule"):
+        bare.columns("rule")
+    assert joined([bare, bare]).strengths is None
     assert len(joined([bare, bare])) == 2
 
 
@@ -80,8 +80,8 @@ def test_every_runtime_gives_the_numbers_of_the_inference(seed: int) -> None:
     assert np.array_equal(result.values, right, equal_nan=True)
     native = ft.run(system, table, columns=system.inputs)
     assert np.allclose(native.values, right, rtol=1e-9, equal_nan=True)
-    assert native.activations is not None
-    assert native.activations.shape == (len(system.rules), 20)
+    assert native.strengths is not None
+    assert native.strengths.shape == (len(system.rules), 20)
 
 
 def test_a_runtime_that_runs_no_systems_says_so() -> None:

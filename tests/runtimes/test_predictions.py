@@ -111,7 +111,8 @@ def test_reasons_show_ties_gaps_and_missing_values() -> None:
 
 
 def test_a_degree_just_below_one_is_not_shown_as_one() -> None:
-    answers = Predictions(("soft",), np.array([0]), np.array([1]), np.array([0]))
+    codes, rule, status = np.array([0]), np.array([1]), np.array([0])
+    answers = Predictions(("soft",), codes, rule, status=status)
     values = np.array([[1.0000001]])
     assert reasons(RULES, values, answers) == ["IF force is low (<1) THEN soft"]
 
