@@ -18,7 +18,6 @@ from fractions import Fraction
 from typing import Final
 
 import msgspec
-import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.arrangement import Arrangement, arrange
@@ -29,8 +28,8 @@ from fuzzytree.auditing.engine.compared import (
     RuleDistance,
     RulePairs,
 )
-from fuzzytree.auditing.engine.domain import Domain, span
-from fuzzytree.auditing.engine.measures import Bounds
+from fuzzytree.auditing.engine.lines import Between
+from fuzzytree.auditing.engine.measures import Bounds, largest_gap
 from fuzzytree.auditing.engine.questions import below, least_cover, uncovered, wins
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules
@@ -38,26 +37,16 @@ from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import (
     BoolArray,
     FloatArray,
-    Points,
     Proposition,
     Rule,
-    RuleBase,
     Term,
     Variable,
-    shapes_of,
 )
 from fuzzytree.numerics import (
-    EnclosedValue,
-    Enclosure,
-    degree_enclosure,
     outwards,
-    proposition_enclosure,
-    strength_enclosure,
 )
 
 _BELOW: Final = "from below: "
-_ROUNDING: Final = 1e-9
-"""What differences of degrees in doubles may be off by, and far more."""
 
 
 class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
@@ -165,35 +154,32 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
 
         That is so only for inexact rules.
         """
-        limit = float(most) + _ROUNDING
         return self.is_inexact(one, other) and not any(
-            bool((low[a - 1] - high[b - 1] > limit).any())
-            for low, high in self._degrees
-            for a, b in ((one, other), (other, one))
+            self._apart(axis, one - 1, other - 1) > most
+            for axis in range(len(self.lower.axes))
         )
+
+    def _apart(self, axis: int, *rules: int) -> Fraction:
+        """Return by how much two rules' degrees on an axis surely differ somewhere."""
+        sides = [of.levels.axes[axis] for of in (self.from_below, self.from_above)]
+        key = axis, *(of.propositions[rule] for of in sides for rule in rules)
+        if key not in self._known:
+            below, above = sides
+            one, other = (
+                Between(below.function(rule).lower, above.function(rule).upper)
+                for rule in rules
+            )
+            self._known[key] = largest_gap(one, other)[0].low
+        return self._known[key]
+
+    @functools.cached_property
+    def _known(self) -> dict[object, Fraction]:
+        return {}
 
     @functools.cached_property
     def _keys(self) -> tuple[tuple[object, ...], ...]:
         count = len(self.lower.rules.rules)
         return tuple(self.bounds.key(n) for n in range(1, count + 1) if self.bounds)
-
-    @functools.cached_property
-    def _degrees(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
-        """For each axis bounds of all rules' degrees at the places of its points.
-
-        Each of shape (rules, places), off by far less than `_ROUNDING`.
-        """
-        bounds: list[tuple[FloatArray, FloatArray]] = []
-        for variable in self.lower.rules.variables:
-            at = _places(variable, self.lower.domain)
-            if not at.size:
-                continue
-            low, high = (
-                _degrees(one.rules, variable.name, at)
-                for one in (self.lower, self.upper)
-            )
-            bounds.append((low[0], high[1]))
-        return tuple(bounds)
 
     def uncovered(self, clock: Clock) -> State:
         """Return whether every rule is somewhere exactly 0; see `cover`."""
@@ -279,37 +265,3 @@ def _terms(variable: Variable) -> Iterator[Term]:
     """Yield the terms of a variable of the lower rules, under names of their own."""
     for term in variable.terms:
         yield replace(term, name=f"{_BELOW}{term.name}")
-
-
-def _places(variable: Variable, domain: Domain) -> FloatArray:
-    """Return the values of a variable at which its terms have points."""
-    low, high = span(variable, domain)
-    values = {
-        x
-        for term in variable.terms
-        if isinstance(term.shape, Points)
-        for x in term.shape.values
-        if low < x <= high
-    }
-    return np.array(sorted(values), np.float64)
-
-
-def _degrees(rules: RuleBase, name: str, at: FloatArray) -> tuple[FloatArray, ...]:
-    """Return bounds of each rule's degree at some values of a variable."""
-    shapes, value = shapes_of(rules.variables), EnclosedValue(at, None)
-    known: dict[Proposition, Enclosure] = {}
-    low, high = (np.ones((len(rules.rules), len(at))) for _ in range(2))
-    is_product = rules.semantics.conjunction == "product"
-    for number, rule in enumerate(rules.rules):
-        whole = Enclosure(low[number], high[number])
-        for proposition in rule.when:
-            if proposition.variable != name:
-                continue
-            if proposition not in known:
-                of = [
-                    degree_enclosure(shapes[name, t], value) for t in proposition.terms
-                ]
-                known[proposition] = proposition_enclosure(proposition, of)
-            whole = strength_enclosure(whole, known[proposition], is_product=is_product)
-        low[number], high[number] = whole
-    return low, high
