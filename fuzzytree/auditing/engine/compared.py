@@ -117,14 +117,14 @@ class RulePairs:
         count = len(self.base.rules.rules)
         return np.array([self._top(rule) > 0 for rule in range(count)], dtype=bool)
 
-    def _top(self, rule: int, but: int = -1) -> Fraction:
-        """Return what a rule does not exceed on all axes, or on all but one."""
-        tops = (
-            axis.function(rule).upper.highest
-            for number, axis in enumerate(self.levels.axes)
-            if number != but
-        )
-        return functools.reduce(self._and, tops, ONE)
+    def _top(self, rule: int) -> Fraction:
+        """Return what a rule does not exceed."""
+
+        def made() -> Fraction:
+            tops = (axis.function(rule).upper.highest for axis in self.levels.axes)
+            return functools.reduce(self._and, tops, ONE)
+
+        return self._once(("top", rule), made)  # type: ignore[return-value]
 
     def _and(self, one: Fraction, other: Fraction) -> Fraction:
         return one * other if self.is_product else min(one, other)

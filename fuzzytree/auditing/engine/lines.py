@@ -198,23 +198,25 @@ def _enclosed(function: MembershipFunction, knots: Sequence[Fraction]) -> Betwee
         one for a, b in itertools.pairwise(knots) for one in _blocks(function, a, b)
     ]
     degrees = {x: _degree(function, x) for x in knots}
+    # Elsewhere it is continuous.
+    limits = {(x, to): _limit(function, x, to) for x in knots for to in (-1, 1)}
     sides: tuple[list[_Chord], list[_Chord]] = ([], [])
     for block in blocks:
         for a, b in block.parts:
             checkpoint()
-            ends = _limit(function, a, 1), _limit(function, b, -1)
-            degrees.setdefault(b, ends[1])
-            chords = _chords(block, (a, b), ends)
-            for side, chord in zip(sides, chords, strict=True):
+            if b not in degrees:
+                degrees[b] = _degree(function, b)
+            ends = limits.get((a, 1), degrees[a]), limits.get((b, -1), degrees[b])
+            for side, chord in zip(sides, _chords(block, (a, b), ends), strict=True):
                 side.append(chord)
     least = min((block.range[0] for block in blocks), default=ZERO)
-    limits = min(least, *(low for low, _ in degrees.values())), ONE
+    held = min(least, *(low for low, _ in degrees.values())), ONE
     lower, upper = (
         _line(
             [*_held(chords, limit, max if side == 0 else min)],
             {x: bounds[side] for x, bounds in degrees.items()},
         )
-        for side, (chords, limit) in enumerate(zip(sides, limits, strict=True))
+        for side, (chords, limit) in enumerate(zip(sides, held, strict=True))
     )
     knots = sorted({*lower.x, *upper.x})
     return Between(_with_knots(lower, knots), _with_knots(upper, knots))

@@ -395,6 +395,15 @@ def largest_gap(one: Between, other: Between) -> tuple[Bounds, Fraction]:
     return Bounds(low, high), place
 
 
+def are_apart(one: Between, other: Between, most: Fraction) -> bool:
+    """Return whether two functions surely differ by more than a number somewhere."""
+    return any(
+        gap > most
+        for first, second in ((one, other), (other, one))
+        for _, gap in _gaps(first.lower, second.upper)
+    )
+
+
 def _gaps(one: Lines, other: Lines) -> Iterator[tuple[Fraction, Fraction]]:
     """Yield by how much a function is above another one, where that can be most."""
     for x, value, rival in at_knots(one, other):

@@ -29,7 +29,7 @@ from fuzzytree.auditing.engine.compared import (
     RulePairs,
 )
 from fuzzytree.auditing.engine.lines import Between
-from fuzzytree.auditing.engine.measures import Bounds, largest_gap
+from fuzzytree.auditing.engine.measures import Bounds, are_apart
 from fuzzytree.auditing.engine.questions import below, least_cover, uncovered, wins
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules
@@ -155,25 +155,26 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
         That is so only for inexact rules.
         """
         return self.is_inexact(one, other) and not any(
-            self._apart(axis, one - 1, other - 1) > most
+            self._are_apart(axis, one - 1, other - 1, most)
             for axis in range(len(self.lower.axes))
         )
 
-    def _apart(self, axis: int, *rules: int) -> Fraction:
-        """Return by how much two rules' degrees on an axis surely differ somewhere."""
-        sides = [of.levels.axes[axis] for of in (self.from_below, self.from_above)]
-        key = axis, *(of.propositions[rule] for of in sides for rule in rules)
+    def _are_apart(self, axis: int, one: int, other: int, most: Fraction) -> bool:
+        below, above = (
+            of.levels.axes[axis] for of in (self.from_below, self.from_above)
+        )
+        key = axis, below.propositions[one], below.propositions[other], most
         if key not in self._known:
-            below, above = sides
-            one, other = (
+            mine, theirs = (
                 Between(below.function(rule).lower, above.function(rule).upper)
-                for rule in rules
+                for rule in (one, other)
             )
-            self._known[key] = largest_gap(one, other)[0].low
+            self._known[key] = are_apart(mine, theirs, most)
         return self._known[key]
 
     @functools.cached_property
-    def _known(self) -> dict[object, Fraction]:
+    def _known(self) -> dict[object, bool]:
+        """Which propositions are apart; both rule bases have the same ones."""
         return {}
 
     @functools.cached_property
