@@ -169,7 +169,6 @@ class LevelAxis:
         for number, groups in enumerate(self.propositions):
             self.kinds[groups] = self.kinds.get(groups, 0) | 1 << number
         self.is_exact = all(element.is_exact for element in self.elements)
-        self._coded = [tuple(map(_coded, element)) for element in self.elements]
         self._known: dict[tuple[Fraction, Fraction, bool, bool], list[Cell]] = {}
         self._by_elements: dict[tuple[int, int, int], tuple[int, int, int]] = {}
         self._functions: dict[Propositions, Between] = {}
@@ -212,6 +211,10 @@ class LevelAxis:
         lower = joined(0)
         is_exact = all(self.elements[i].is_exact for group in groups for i in group)
         return Between(lower, lower if is_exact else joined(1))
+
+    @functools.cached_property
+    def _coded(self) -> list[tuple[_Coded, ...]]:
+        return [tuple(map(_coded, element)) for element in self.elements]
 
     def between_own(self, place: int) -> Sequence[Cell]:
         """Return the cells between two critical levels of this axis.

@@ -455,15 +455,20 @@ def together(
     a = one.x[0]
     p, r = (of.after[0] if of.after else ZERO for of in (one, other))
     while i < len(one.after) and j < len(other.after):
-        b = min(one.x[i + 1], other.x[j + 1])
-        q = _on(one.x[i], one.x[i + 1], one.after[i], one.before[i], b)
-        s = _on(other.x[j], other.x[j + 1], other.after[j], other.before[j], b)
+        end, rival_end = one.x[i + 1], other.x[j + 1]
+        is_first, is_last = end <= rival_end, end >= rival_end
+        b = end if is_first else rival_end
+        q, s = one.before[i], other.before[j]
+        if not is_first:
+            q = _on(one.x[i], end, one.after[i], q, b)
+        if not is_last:
+            s = _on(other.x[j], rival_end, other.after[j], s, b)
         yield a, b, p, q, r, s
         p, r = q, s
-        if one.x[i + 1] == b:
+        if is_first:
             i += 1
             p = one.after[i] if i < len(one.after) else ZERO
-        if other.x[j + 1] == b:
+        if is_last:
             j += 1
             r = other.after[j] if j < len(other.after) else ZERO
         a = b
