@@ -45,7 +45,7 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
     point_of,
 )
-from fuzzytree.auditing.engine.witnesses import AxisStretch
+from fuzzytree.auditing.engine.witnesses import AxisStretch, point_with
 from fuzzytree.model import BoolArray, FloatArray, checkpoint
 from fuzzytree.numerics import outwards
 
@@ -538,17 +538,29 @@ class RulePairs:
         self, rules: tuple[int, int], level: Fraction, high: Fraction, clock: Clock
     ) -> JointMaximum:
         base = self.base
+        best = {
+            number: AxisStretch(x, x, is_open=False)
+            for number, axis in enumerate(self.levels.axes)
+            for x in [_meeting_place(axis, *rules)]
+        }
+        point = point_with(base, best)
+        witness = None if point is None else self._checked(rules, point, level)
+        if witness is not None and _reached(witness) == high:
+            return JointMaximum(Bounds(high, high), witness)
         for tolerance in (float(_CLOSE), 1e-12):
             found = highest_by_boxes(
                 base.rules, base.domain, *rules, clock, tolerance=tolerance
             )
             if not found.low < level <= found.high:
                 break  # it is known whether they reach the level
-        point = point_of(found.point)
         most = max(min(high, Fraction(found.high)), Fraction(found.low))
-        witness = self._checked(rules, point, level) if point else None
-        if witness is None:
+        tried = (
+            self._checked(rules, point_of(found.point), level) if found.point else None
+        )
+        known = [one for one in (tried, witness) if one is not None]
+        if not known:
             return JointMaximum(Bounds(Fraction(found.low), most), found)
+        witness = max(known, key=_reached)
         low = _reached(witness)
         return JointMaximum(Bounds(low, max(low, most)), witness)
 
@@ -571,6 +583,17 @@ def _without_common(
 
 
 # --- two functions on one axis
+
+
+def _meeting_place(axis: LevelAxis, one: int, other: int) -> Fraction:
+    """Return where the smaller of two rules' degrees is largest, or nearly so."""
+    f, g = axis.function(one - 1).lower, axis.function(other - 1).lower
+    places = [(min(p, r), x) for x, p, r in at_knots(f, g)]
+    for a, b, p, q, r, s in together(f, g):
+        if (p - r) * (q - s) < 0:
+            share = (p - r) / (p - r - q + s)
+            places.append((p + (q - p) * share, a + (b - a) * share))
+    return max(places)[1]
 
 
 def _least(values: Iterable[_Infimum]) -> _Infimum | None:
