@@ -122,7 +122,7 @@ def allowed(system: FuzzySystem, found: Any) -> FloatArray:
     assert output.low is not None
     assert output.high is not None
     points = output.defuzzifier.samples * (2 + len(output.terms))
-    highest = np.maximum(found.activations.max(axis=0), 1e-300)
+    highest = np.maximum(found.strengths.max(axis=0), 1e-300)
     size = max(abs(output.low), abs(output.high)) + (output.high - output.low)
     bound: FloatArray = size * EPSILON * (4 * points + 64 * points / highest)
     return bound
