@@ -5,11 +5,14 @@ A tree is no program, for a row passes few of its nodes; the values of its nodes
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from fuzzytree.model import (
     FuzzyTree,
     Proposition,
     Rule,
     RuleBase,
+    SystemOutput,
     Variable,
     proposition_text,
     shapes_of,
@@ -39,12 +42,7 @@ def from_rules(rules: RuleBase) -> Program:
         True
     """
     make = Maker()
-    axes: dict[str, Place] = {}
-    for one in rules.variables:
-        with make.topic(one.name):
-            axes[one.name] = make.titled(axis(make, one), one.name)
-    with make.topic("inputs"):
-        known = known_row(make, list(axes.values()))
+    known, axes = input_values(make, rules.variables)
     strengths = _strengths(make, rules, axes)
     with make.topic("highest strength"):
         best = make.chain("maximum", strengths)
@@ -80,25 +78,43 @@ def from_axes(tree: FuzzyTree) -> Program:
     """Return a program with the value of each variable: inputs, then combinations."""
     make = Maker()
     order = sorted(tree.variables, key=lambda variable: bool(variable.parts))
-    results = [result_of("output", one.name, axis(make, one)) for one in order]
+    _, axes = input_values(make, order)
+    results = [result_of("output", one.name, axes[one.name]) for one in order]
     return make.program(tree.name, tree.inputs, tuple(results))
 
 
-def axis(make: Maker, variable: Variable) -> Place:
-    """Return the value of a variable: an input, or a sum of parts in order."""
-    if not variable.parts:
-        return make.input(variable.name)
-    parts = variable.parts
-    terms = [one.weight * (make.input(one.input) - one.centre) for one in parts]
-    return make.chain("add", terms)
+def input_values(
+    make: Maker, variables: Iterable[Variable]
+) -> tuple[Place, dict[str, Place]]:
+    """Return whether all values are finite, and each variable's value in its range.
+
+    A combination is the sum of its parts in order.
+    """
+    results: list[Place] = []
+    values: dict[str, Place] = {}
+    for one in variables:
+        with make.topic(one.name):
+            terms = [p.weight * (values[p.input] - p.centre) for p in one.parts]
+            value = make.chain("add", terms) if terms else make.input(one.name)
+            results.append(make.titled(value, one.name))
+            values[one.name] = clamped(make, one, value) if one.clips else value
+            make.titled(values[one.name], f"{one.name} clamped")
+    with make.topic("inputs"):
+        if not results:  # all of no values are finite
+            results = [make.constant(0.0)]
+        return make.chain("and", [make("is_finite", one) for one in results]), values
 
 
-def known_row(make: Maker, axes: list[Place]) -> Place:
-    """Return whether all of some values are finite; always if there are none."""
-    if not axes:
-        zero = make.constant(0.0)
-        return make.at_most(zero, zero)
-    return make.chain("and", [make("is_finite", value) for value in axes])
+def clamped(make: Maker, one: Variable | SystemOutput, value: Place) -> Place:
+    """Return a value moved into a range; NaN stays NaN."""
+    result = value
+    if one.high is not None:
+        high = make.constant(one.high)
+        result = make.where(make.less(high, value), high, result)
+    if one.low is not None:
+        low = make.constant(one.low)
+        result = make.where(make.less(value, low), low, result)
+    return result
 
 
 def _strengths(make: Maker, rules: RuleBase, axes: dict[str, Place]) -> list[Place]:

@@ -35,7 +35,6 @@ from fuzzytree.model import (
     SystemRule,
     Term,
     TNorm,
-    Variable,
     as_number,
     checkpoint,
     hedged,
@@ -55,7 +54,8 @@ from fuzzytree.semantics.programs.rule_program import (
     DECIDED,
     MISSING,
     UNCOVERED,
-    known_row,
+    clamped,
+    input_values,
 )
 from fuzzytree.semantics.programs.steps import Maker, Place, Program, Result, result_of
 
@@ -91,7 +91,7 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
         (30.0,)
     """
     make = Maker()
-    known, values = _values(make, system)
+    known, values = input_values(make, system.variables)
     run = _Run(make, system, values)
     for block in system.blocks:
         run.activate(block)
@@ -115,46 +115,11 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
     return make.program(system.name, system.inputs, tuple(results))
 
 
-def _values(make: Maker, system: FuzzySystem) -> tuple[Place, dict[str, Place]]:
-    """Return whether all values are finite, and each input's value in its range."""
-    results: list[Place] = []
-    values: dict[str, Place] = {}
-    for one in system.variables:
-        with make.topic(one.name):
-            value = _combined(make, one, values) if one.parts else make.input(one.name)
-            make.titled(value, one.name)
-            results.append(value)
-            values[one.name] = _clamped(make, one, value) if one.clips else value
-            make.titled(values[one.name], f"{one.name} clamped")
-    with make.topic("inputs"):
-        return known_row(make, results), values
-
-
-def _combined(make: Maker, one: Variable, values: dict[str, Place]) -> Place:
-    terms: list[Place] = []
-    for part in one.parts:
-        offset = values[part.input] - part.centre
-        terms.append(part.weight * offset)
-    return make.chain("add", terms)
-
-
-def _clamped(make: Maker, one: Variable | SystemOutput, value: Place) -> Place:
-    """Return a value moved into a range; NaN stays NaN."""
-    clamped = value
-    if one.high is not None:
-        high = make.constant(one.high)
-        clamped = make.where(make.less(high, value), high, clamped)
-    if one.low is not None:
-        low = make.constant(one.low)
-        clamped = make.where(make.less(value, low), low, clamped)
-    return clamped
-
-
 def _answer(make: Maker, output: SystemOutput, number: Place) -> Place:
     if output.default is not None:
         default = make.constant(output.default)
         number = make.where(is_nan(make, number), default, number)
-    return _clamped(make, output, number) if output.clips else number
+    return clamped(make, output, number) if output.clips else number
 
 
 def _status(make: Maker, known: Place, numbers: Sequence[Place]) -> Place:
