@@ -26,12 +26,14 @@ from fuzzytree.model import noticed, watched
 
 _OWN = (
     *("learn", "collect", "show", "export", "convert", "run", "check", "audit"),
-    *("diff", "explain", "recheck", "bench", "needs", "stability", "tactile"),
-    *("formats", "doctor"),
+    *("diff", "explain", "recheck", "bench", "needs", "stability"),
 )
 VERBS: Mapping[str, str] = MappingProxyType(
-    {name: f"fuzzytree.cli.{name}" for name in _OWN}
-    | {"tactile": "fuzzytree.tactile.cli"}
+    {
+        **{name: f"fuzzytree.cli.{name}" for name in _OWN},
+        "tactile": "fuzzytree.tactile.cli",
+        **{name: f"fuzzytree.cli.{name}" for name in ("formats", "doctor")},
+    }
 )
 """The module whose `command` each verb is, in the order of the help."""
 
