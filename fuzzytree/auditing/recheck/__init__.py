@@ -28,7 +28,6 @@ from fuzzytree.auditing.recheck.checks import (
     check_files,
     check_head,
 )
-from fuzzytree.auditing.recheck.deciding import without
 from fuzzytree.auditing.recheck.models import Model
 from fuzzytree.auditing.recheck.outcomes import (
     CannotRunError,
@@ -75,7 +74,6 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
     try:
         check_files(case, report, facts, model, names[1])
         check_head(result, case, report)
-        _name_shorter(case)
         for number, answer in enumerate(case.answers, 1):
             check_answer(case, report, answer, number)
     except (DoesNotHoldError, UndecidedError) as error:
@@ -104,7 +102,6 @@ def undecided(
     """
     _, _, case = _read(audit, model, ("the audit", "model.yaml"), Limit(is_late))
     result: dict[int, str] = {}
-    _name_shorter(case)
     for place, answer in enumerate(case.answers):
         if isinstance(answer.state, Proved):
             report = Report()
@@ -129,13 +126,6 @@ def _read(
     if any(side.is_open for side in result.domain.sides):
         raise CannotRunError(f"{names[0]}: a domain with an open side is not checked")
     return facts, result, Case(result, whole, limit)
-
-
-def _name_shorter(case: Case) -> None:
-    """Name the rules without a proposition that answers are about."""
-    for position, answer in enumerate(case.answers):
-        if answer.message == "FT107.irrelevant":
-            case.shorter[position] = without(case, answer)
 
 
 def recheck_files(*names: str) -> Report:

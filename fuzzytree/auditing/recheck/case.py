@@ -56,7 +56,7 @@ class Case:
         is_free: Whether no variable is a combination of others.
         numbers: The numbers of the rules, from 1.
         limit: How much work an answer may take.
-        shorter: By the position of an answer of FT107, the rule that it is about.
+        more: Rules that are none of the model's; their numbers come after these.
     """
 
     def __init__(self, facts: Audit | Difference, model: Model, limit: Limit) -> None:
@@ -67,7 +67,7 @@ class Case:
         self.sides = {n: side for n, side in sides.items() if n in model.variables}
         self.is_free = not any(v.parts for v in model.variables.values())
         self.numbers = range(1, len(self.rules.rules) + 1)
-        self.shorter: dict[int, Rule] = {}
+        self.more: list[Rule] = []
         self._strengths: dict[tuple[object, ...], list[Between]] = {}
         self._cells: dict[int, Cells | UndecidedError] = {}
 
@@ -122,13 +122,13 @@ class Case:
     # --- what can be
 
     def cells(self, step: int) -> Cells:
-        """Return the rules in cells; behind them those of `shorter`.
+        """Return the rules in cells; behind them those of `more`.
 
         Raises:
             UndecidedError: If there are too many.
         """
         if step not in self._cells:
-            rules = [*self.rules.rules, *self.shorter.values()]
+            rules = self.rules.rules
             has_twice = any(len({*rule.when}) < len(rule.when) for rule in rules)
             if self.rules.is_product and has_twice:
                 raise UndecidedError("a product in which one degree stands twice")
@@ -150,7 +150,16 @@ class Case:
         result = self._cells[step]
         if isinstance(result, UndecidedError):
             raise result
+        of = result.of
+        of += [
+            result.needs(one.when) for one in self.more[len(of) - len(self.numbers) :]
+        ]
         return result
+
+    def number_of(self, rule: Rule) -> int:
+        """Return a number for a rule of the model that lacks a proposition."""
+        self.more.append(rule)
+        return len(self.numbers) + len(self.more)
 
     def refined(
         self, question: Callable[[Cells], bool], *, is_sure: bool = False
@@ -197,11 +206,8 @@ class Case:
                 )
             return cells.exists(ours, sum(1 << (n - 1) for n in others), low, high)
 
-        if (
-            len(mine) == len(others) == 1
-            and not low
-            and mine[0] in self.above[others[0]]
-        ):
+        is_plain = len(mine) == 1 and len(others) < 2 and not low
+        if is_plain and mine[0] in self.above[others[0] if others else 0]:
             return True
         return self.refined(question, is_sure=self.rules.is_product)
 
@@ -217,19 +223,6 @@ class Case:
             )
 
         return self.refined(question, is_sure=self.rules.is_product)
-
-    def fires(self, number: int) -> bool:
-        """Return whether a rule is above 0 somewhere."""
-        return bool(self.fired >> (number - 1) & 1) or self.beats([number], ())
-
-    @cached_property
-    def fired(self) -> int:
-        """The rules that are above 0 at a known point, as bits."""
-        return sum(
-            1 << (n - 1)
-            for n in self.numbers
-            if any(one[n - 1][0] > 0 for one in self.known)
-        )
 
     @cached_property
     def known(self) -> list[list[Between]]:
@@ -253,13 +246,11 @@ class Case:
 
     @cached_property
     def above(self) -> dict[int, set[int]]:
-        """For each rule, and shorter one, those known to be above it somewhere."""
-        result: dict[int, set[int]] = {
-            n: set() for n in range(1, len(self.numbers) + len(self.shorter) + 1)
-        }
+        """For each rule those known to be above it somewhere; for 0 those that fire."""
+        result: dict[int, set[int]] = {n: set() for n in (0, *self.numbers)}
         for one in self.known:
-            for n in self.numbers:
-                result[n] |= {m for m in self.numbers if one[m - 1][0] > one[n - 1][1]}
+            for n, (_, most) in enumerate([(ZERO, ZERO), *one]):
+                result[n] |= {m for m in self.numbers if one[m - 1][0] > most}
         return result
 
     # --- points

@@ -194,7 +194,7 @@ def hidden(case: Case, answer: Answer) -> None:
 def no_other_hidden(case: Case, answer: Answer) -> None:
     """Check that each rule of other pairs is somewhere the stronger one."""
     is_alike = answer.code == "FT104"
-    fires = {n for n in case.numbers if case.fires(n)}
+    fires = {n for n in case.numbers if case.beats([n], ())}
     pairs = [pair for pair in case.pairs(alike=is_alike) if {*pair} <= fires]
     silent_count = len(case.numbers) - len(fires)
     counted(
@@ -304,8 +304,7 @@ def irrelevant(case: Case, answer: Answer) -> None:
     It does where it wins and a rule of another class was above all of its own class;
     or where no rule fired; it may where it ties with a later rule of another class.
     """
-    position = case.answers.index(answer)
-    rest = len(case.numbers) + 1 + [*case.shorter].index(position)
+    rest = case.number_of(without(case, answer))
     (number,) = answer.rules
     own, rivals = case.own(case.then(number)), case.rivals(number)
     if not case.beats([rest], [number]):
@@ -320,11 +319,6 @@ def irrelevant(case: Case, answer: Answer) -> None:
     )
     if is_more:
         raise UndecidedError("the rule is stronger without it, if not in its answers")
-
-
-def never_fires_at_all(case: Case, answer: Answer) -> None:
-    """Check that a rule never fires."""
-    require(not case.fires(answer.rules[0]), "the rule fires somewhere")
 
 
 def apart(case: Case, answer: Answer) -> None:
@@ -740,7 +734,7 @@ PROOFS: dict[str, Callable[[Case, Answer], None]] = {
     "FT106.different": same,
     "FT106.others": no_others_same,
     "FT107.irrelevant": irrelevant,
-    "FT107.silent": never_fires_at_all,
+    "FT107.silent": never_fires,
     "FT201.never": apart,
     "FT201.unlisted": apart,
     "FT202.others": no_other_ties,

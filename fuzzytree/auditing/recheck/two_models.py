@@ -184,7 +184,7 @@ def _axis(variable: Variable) -> Hashable:
 
 def _needed(case: Case) -> list[int]:
     """Return the rules that fire, and that no neighbour of their class hides."""
-    kept = [n for n in case.numbers if case.fires(n)]
+    kept = [n for n in case.numbers if case.beats([n], ())]
     for number in [*kept]:
         blocks = (
             {*block} for _, block in itertools.groupby(kept, lambda n: case.then(n))
