@@ -226,7 +226,7 @@ def _ends(
         degrees = 2 * p - q, 2 * q - p
     if negated:
         degrees = 1 - degrees[0], 1 - degrees[1]
-    return weight * degrees[0], weight * degrees[1]
+    return degrees if weight == 1 else (weight * degrees[0], weight * degrees[1])
 
 
 def _chain(groups: Sequence[Group], gap: int) -> Iterator[Pattern]:

@@ -351,7 +351,7 @@ def top(case: Case, answer: Answer) -> None:
     """Check the highest level that two rules reach together."""
     if case.rules.is_product:
         raise UndecidedError("the highest common level of products")
-    cells = case.cells(STEPS[-1])
+    cells = case.cells(STEPS[0])
     highest = cells.highest(*(cells.of[n - 1] for n in answer.rules))
     is_one = len(answer.measures) == 1 and cells.is_exact and case.is_free
     value = answer.measures[-1].value
@@ -390,7 +390,7 @@ def least_cover(case: Case, answer: Answer) -> None:
     is_less = bool(low) and case.beats((), case.numbers, high=low)
     require(not is_less, "somewhere every rule is weaker than reported")
     if not case.rules.is_product and high < 1:
-        cells = case.cells(STEPS[-1])
+        cells = case.cells(STEPS[0])
         if cells.is_exact and case.is_free:
             text = "everywhere some rule is stronger than reported"
             require(cells.least_cover() <= high + ROUNDED, text)
