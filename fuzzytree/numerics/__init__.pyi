@@ -9,8 +9,6 @@ from .conditioning import Conduct as Conduct
 from .conditioning import conduct as conduct
 from .curve_values import Between as Between
 from .curve_values import degree_between as degree_between
-from .curve_values import powered as powered
-from .curve_values import root as root
 from .curves import BELOW_ONE as BELOW_ONE
 from .enclosures import LEAST as LEAST
 from .enclosures import EnclosedValue as EnclosedValue

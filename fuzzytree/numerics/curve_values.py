@@ -129,25 +129,6 @@ def root(square: Fraction) -> Between:
     return _around(near, _OFF * 2)
 
 
-def powered(base: Fraction, power: Fraction) -> Between:
-    """Return bounds of `base**power`, clamped to 1, for a base from 0 on.
-
-    Args:
-        base: At least 0.
-        power: Above 0, if the base is 0.
-
-    Example:
-        >>> low, high = powered(Fraction(1, 4), Fraction(3, 2))
-        >>> low < Fraction(1, 8) < high, high - low < Fraction(1, 10**40)
-        (True, True)
-    """
-    if base in (_ZERO, _ONE):
-        return _exactly(base)
-    log, off = _log(base)
-    low, high = (_exp(power * log + sign * abs(power) * off) for sign in (-1, 1))
-    return Between(low.low, high.high)
-
-
 def _exactly(value: Fraction) -> Between:
     return Between(value, value)
 

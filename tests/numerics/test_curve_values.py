@@ -31,7 +31,7 @@ from fuzzytree.model import (
     TwoGaussians,
 )
 from fuzzytree.model.rulebase import Points
-from fuzzytree.numerics.curve_values import degree_between, powered, root
+from fuzzytree.numerics.curve_values import degree_between, root
 from fuzzytree.semantics.inference import curve_degree
 
 LONG = Context(prec=120)
@@ -111,7 +111,6 @@ def test_bounds_hold_what_more_digits_tell() -> None:
             ),
             (degree_between(Cosine(0.0, 2.0), x), raised_cosine(number)),
             (root(x), LONG.sqrt(number)),
-            (powered(x, Fraction(3, 4)), LONG.exp(LONG.multiply(log, Decimal("0.75")))),
         ):
             assert bounds is not None
             assert bounds.low <= Fraction(right) <= bounds.high
