@@ -194,6 +194,10 @@ class _Chord(NamedTuple):
 
 
 def _enclosed(function: MembershipFunction, knots: Sequence[Fraction]) -> Between:
+    if len(knots) == 1:
+        low, high = _degree(function, knots[0])
+        x = knots[0]
+        return Between(constant(low, x, x), constant(high, x, x))
     blocks = [
         one for a, b in itertools.pairwise(knots) for one in _blocks(function, a, b)
     ]

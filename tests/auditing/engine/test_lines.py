@@ -1,0 +1,68 @@
+"""Functions between two functions of straight lines: nowhere beyond, and not far."""
+
+from __future__ import annotations
+
+import random
+from fractions import Fraction
+from typing import get_args
+
+import pytest
+
+from fuzzytree.auditing.engine.lines import APART, Between, Hedged, lines_of
+from fuzzytree.model import (
+    LR,
+    Curve,
+    Gaussian,
+    Hedge,
+    MembershipFunction,
+    Points,
+    SCurve,
+    Side,
+)
+from fuzzytree.numerics import degree_between
+from fuzzytree.semantics.inference.degrees import hedged
+
+LOW, HIGH = Fraction(-3), Fraction(4)
+NEAR = 2.0**-40  # what evaluation in doubles may be off by, and more
+
+TRIANGLE = Points((0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
+STEPS = Points((0.0, 0.0, 1.0, 1.0), (0.0, 1.0, 1.0, 0.3))
+CURVES: tuple[Curve, ...] = (
+    *(Gaussian(0.3, 0.7), SCurve(-1.0, 2.0), TRIANGLE, STEPS),
+    LR(0.0, Side(1.0, (0.5,), 2.0), Side(0.5, (0.5, 0.3), 3.0)),
+)
+
+
+def places(known: Between) -> list[Fraction]:
+    """Return drawn values, and knots with values close to them."""
+    chance = random.Random(7)
+    found = [Fraction(chance.uniform(float(LOW), float(HIGH))) for _ in range(40)]
+    every = known.lower.x
+    for x in every[:: max(len(every) // 20, 1)]:
+        found += [x + Fraction(off, 10**15) for off in (-1, 0, 1)]
+    return [x for x in found if LOW <= x <= HIGH]
+
+
+@pytest.mark.parametrize("hedge", get_args(Hedge))
+@pytest.mark.parametrize("curve", CURVES, ids=lambda curve: type(curve).__name__)
+def test_what_hedges_make_of_a_curve_lies_between_two_lines(
+    curve: Curve, hedge: Hedge
+) -> None:
+    height = 0.75
+    known = lines_of(Hedged(curve, height, (hedge,)), LOW, HIGH)
+    for x in places(known):
+        true = degree_between(curve, x)
+        assert true is not None
+        ends = sorted(hedged((hedge,), height * float(one)) for one in true)
+        low, high = known.lower.value(x), known.upper.value(x)
+        assert low <= ends[1] + NEAR
+        assert high >= ends[0] - NEAR
+        assert high - low <= 2 * APART  # of two neighbours
+
+
+@pytest.mark.parametrize("curve", CURVES, ids=lambda curve: type(curve).__name__)
+def test_a_single_value_has_the_degree_of_the_curve(curve: MembershipFunction) -> None:
+    x = Fraction(1, 2)
+    known = lines_of(curve, x, x)
+    assert known.lower.x == known.upper.x == (x,)
+    assert 0 <= known.upper.at[0] - known.lower.at[0] <= Fraction(1, 1 << 30)
