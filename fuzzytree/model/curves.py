@@ -178,7 +178,33 @@ class Bell(MembershipFunction, frozen=True, tag="bell"):
         return self.slope != 0.0
 
 
-class Sigmoid(MembershipFunction, frozen=True, tag="sigmoid"):
+class _Open(MembershipFunction, frozen=True):
+    """A function that stays above 0 without end."""
+
+    @property
+    def is_open(self) -> bool:
+        """Always."""
+        return True
+
+
+class _Rise(_Open, frozen=True):
+    """A function that rises from 0 at `start` to 1 at `end`, or falls."""
+
+    start: float
+    end: float
+
+    @property
+    def is_unit(self) -> bool:
+        """Whether its width is finite."""
+        return math.isfinite(self.end - self.start)
+
+    def mistakes(self) -> Iterator[str]:
+        """Yield what is wrong with its ends."""
+        yield from super().mistakes()
+        yield from width_mistakes(self.start, self.end)
+
+
+class Sigmoid(_Open, frozen=True, tag="sigmoid"):
     """`1 / (1 + exp(-slope (x - inflection)))`."""
 
     inflection: float
@@ -207,11 +233,6 @@ class Sigmoid(MembershipFunction, frozen=True, tag="sigmoid"):
     def is_unit(self) -> bool:
         """Whether the slope is not 0."""
         return self.slope != 0.0
-
-    @property
-    def is_open(self) -> bool:
-        """Always."""
-        return True
 
 
 class _TwoSigmoids(MembershipFunction, frozen=True):
@@ -275,15 +296,12 @@ class SigmoidProduct(_TwoSigmoids, frozen=True, tag="sigmoid product"):
         return tuple(sorted({self.first.inflection, self.second.inflection}))
 
 
-class SCurve(MembershipFunction, frozen=True, tag="s"):
+class SCurve(_Rise, frozen=True, tag="s"):
     """Two parabolas that rise from 0 at `start` to 1 at `end`; with end < start, falls.
 
     With `t = (x - start) / (end - start)`: `2 t^2` up to t = 1/2, then
     `1 - 2 (1 - t)^2`; 0 and 1 beyond. MATLAB's smf, and zmf where `end < start`.
     """
-
-    start: float
-    end: float
 
     def degree(self, n: Numbers[N], x: N) -> N:
         """Return the first parabola up to the middle, then the second one."""
@@ -299,21 +317,6 @@ class SCurve(MembershipFunction, frozen=True, tag="s"):
     def knots(self) -> tuple[float, ...]:
         """Return the ends and the middle."""
         return _s_knots(self.start, self.end)
-
-    @property
-    def is_unit(self) -> bool:
-        """Whether its width is finite."""
-        return math.isfinite(self.end - self.start)
-
-    @property
-    def is_open(self) -> bool:
-        """Always."""
-        return True
-
-    def mistakes(self) -> Iterator[str]:
-        """Yield what is wrong with its ends."""
-        yield from super().mistakes()
-        yield from width_mistakes(self.start, self.end)
 
 
 class PiCurve(MembershipFunction, frozen=True, tag="pi"):
@@ -370,7 +373,7 @@ class Cosine(MembershipFunction, frozen=True, tag="cosine"):
         return tuple(sorted(knots))
 
 
-class Concave(MembershipFunction, frozen=True, tag="concave"):
+class Concave(_Open, frozen=True, tag="concave"):
     """`(end - inflection) / (2 end - inflection - x)` before `end`, 1 from it on.
 
     Where `inflection > end` it falls: `(inflection - end) / (inflection - 2 end + x)`
@@ -408,11 +411,6 @@ class Concave(MembershipFunction, frozen=True, tag="concave"):
         """Whether twice its width is finite."""
         return math.isfinite(2.0 * (self.end - self.inflection))
 
-    @property
-    def is_open(self) -> bool:
-        """Always."""
-        return True
-
     def mistakes(self) -> Iterator[str]:
         """Yield what is wrong with its ends."""
         yield from super().mistakes()
@@ -440,14 +438,11 @@ class Spike(MembershipFunction, frozen=True, tag="spike"):
         return self.center - self.width / 2, self.center + self.width / 2
 
 
-class Arc(MembershipFunction, frozen=True, tag="arc"):
+class Arc(_Rise, frozen=True, tag="arc"):
     """A quarter of an ellipse that rises from 0 at `start` to 1 at `end`, then 1.
 
     With `end < start` it falls: 1 up to `end`, 0 from `start` on.
     """
-
-    start: float
-    end: float
 
     def degree(self, n: Numbers[N], x: N) -> N:
         """Return the quarter of an ellipse, 0 before it and 1 behind it."""
@@ -465,23 +460,12 @@ class Arc(MembershipFunction, frozen=True, tag="arc"):
         """Return the ends."""
         return min(self.start, self.end), max(self.start, self.end)
 
-    @property
-    def is_unit(self) -> bool:
-        """Whether its width is finite."""
-        return math.isfinite(self.end - self.start)
-
-    @property
-    def is_open(self) -> bool:
-        """Always."""
-        return True
-
     def mistakes(self) -> Iterator[str]:
         """Yield what is wrong with its ends."""
         yield from super().mistakes()
         if self.start == self.end:
             text = "an arc must start and end at different values"
             yield f"{text}, not at {self.end!r}"
-        yield from width_mistakes(self.start, self.end)
 
 
 class SemiEllipse(MembershipFunction, frozen=True, tag="semi ellipse"):
@@ -516,7 +500,7 @@ class SemiEllipse(MembershipFunction, frozen=True, tag="semi ellipse"):
         yield from width_mistakes(self.start, self.end)
 
 
-class Binary(MembershipFunction, frozen=True, tag="binary"):
+class Binary(_Open, frozen=True, tag="binary"):
     """1 on one side of `start`, `start` included, and 0 on the other."""
 
     start: float
@@ -532,11 +516,6 @@ class Binary(MembershipFunction, frozen=True, tag="binary"):
     def knots(self) -> tuple[float, ...]:
         """Return the start."""
         return (self.start,)
-
-    @property
-    def is_open(self) -> bool:
-        """Always."""
-        return True
 
 
 class Singleton(MembershipFunction, frozen=True, tag="singleton"):
