@@ -17,7 +17,7 @@ from fuzzytree.benchmarking import (
     times_faster,
     title,
 )
-from fuzzytree.report.text import aligned, counted, digits, duration, wrapped
+from fuzzytree.report.text import aligned, counted, digits, duration, more_line, wrapped
 from fuzzytree.runtimes import baseline
 
 _HEAD = (
@@ -59,7 +59,9 @@ def study_lines(
         return
     if study.points:
         yield from aligned([_UNBEATEN, *_unbeaten(study)][: _MOST_UNBEATEN + 1])
-    yield from _more("doubtful: ", study.warnings[:2], len(study.warnings) - 2)
+    for text in study.warnings[:2]:
+        yield from wrapped(f"doubtful: {text}", _WIDTH, rest="  ")
+    yield from more_line(len(study.warnings) - 2, "doubt")
     names = {one.name for one in study.omissions}
     if names:
         yield f"{counted(len(names), 'candidate')} left out"
@@ -68,13 +70,6 @@ def study_lines(
 
 def _nothing(study: Study) -> str:
     return "measured" if study.points else "nothing could be measured"
-
-
-def _more(title: str, shown: Sequence[str], rest: int) -> Iterator[str]:
-    for text in shown:
-        yield from wrapped(f"{title}{text}", _WIDTH, rest="  ")
-    if rest > 0:
-        yield f"{title}{rest} more; --verbose lists all"
 
 
 def _unbeaten(study: Study) -> Iterator[tuple[str, ...]]:

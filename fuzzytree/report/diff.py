@@ -14,7 +14,7 @@ from fuzzytree.auditing import (
 from fuzzytree.model import printable
 from fuzzytree.report.audit import WIDTH, region_text
 from fuzzytree.report.audit_states import state_text, state_word
-from fuzzytree.report.text import counted, some, wrapped
+from fuzzytree.report.text import counted, more_line, some, wrapped
 
 _MOST_ANSWERS = 6  # answers about decisions, unless all are printed
 _MOST_CHANGES = 6
@@ -47,18 +47,13 @@ def diff_lines(difference: Difference, *, is_verbose: bool = False) -> Iterator[
     for answer in answers[:most]:
         points += isinstance(answer.state, Witness)
         yield from _answer_lines(answer, has_point=is_verbose or points <= 1)
-    yield from _more(len(answers) - most, "answer")
+    yield from more_line(len(answers) - most, "answer")
     if difference.changes:
         yield "changes"
     most = len(difference.changes) if is_verbose else _MOST_CHANGES
     for change in difference.changes[:most]:
         yield from _change_lines(change, has_place=is_verbose)
-    yield from _more(len(difference.changes) - most, "change")
-
-
-def _more(count: int, noun: str) -> Iterator[str]:
-    if count > 0:
-        yield f"  and {counted(count, f'more {noun}')}; --verbose lists all"
+    yield from more_line(len(difference.changes) - most, "change")
 
 
 def diff_verdict(difference: Difference) -> str:

@@ -6,7 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.benchmarking import Cost, File, Footprint, Size, times_faster
 from fuzzytree.checking import Because, Graph, Needs
-from fuzzytree.report.text import agreement_lines, aligned, counted, duration
+from fuzzytree.report.text import (
+    agreement_lines,
+    aligned,
+    counted,
+    duration,
+    first_lines,
+    more_line,
+)
 from fuzzytree.semantics import Removed
 
 _MOST = 6  # parts printed one by one, unless all are
@@ -39,9 +46,8 @@ def report_lines(footprint: Footprint, *, is_verbose: bool = False) -> Iterator[
         yield from aligned(_cost_rows(footprint.costs))
         yield "median of one call in one thread; in brackets the 95 % interval"
     missing = [*dict.fromkeys([*needs.omissions, *footprint.omissions])]
-    yield from (f"not reported: {text}" for text in missing[:most])
-    if missing[len(missing) if most is None else most :]:
-        yield f"and {len(missing) - _MOST} more; --verbose lists all"
+    lines = [f"not reported: {text}" for text in missing]
+    yield from first_lines(lines, most, "omission")
 
 
 _SIZES = 5  # rows of the table of sizes: head, columns, bytes, terms, the first file
@@ -80,8 +86,7 @@ def _removed_lines(
     rows = [(title, "why", "changes")]
     rows += [(one.where, one.why, one.changes or "nothing") for one in removed[:most]]
     yield from aligned(rows)
-    if len(rows) <= len(removed):
-        yield f"and {len(removed) - len(rows) + 1} more; --verbose lists all"
+    yield from more_line(len(removed) - len(rows) + 1, "part")
 
 
 # --- graphs

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fuzzytree.checking import Criterion, CurveFault, OffsetCost, Stability, Stiff
-from fuzzytree.report.text import aligned, counted, number
+from fuzzytree.report.text import aligned, counted, first_lines, more_line, number
 
 _CURVES_SHOWN = 5  # curves with a fault, unless all are printed
 _INPUTS_SHOWN = 6  # inputs that float32 is not safe for, unless all are printed
@@ -41,12 +41,11 @@ def stability_lines(study: Stability, *, is_verbose: bool = False) -> Iterator[s
     if faults:
         shown = faults if is_verbose else faults[:_CURVES_SHOWN]
         yield from aligned([_CURVE, *map(_curve_row, shown)])
-        if len(shown) < len(faults):
-            yield f"{len(faults) - len(shown)} more curves; --verbose lists all"
-    todo = [*advice(study)]
-    yield from (f"what to do: {text}" for text in todo[: None if is_verbose else 5])
-    if len(todo) > 5 and not is_verbose:
-        yield f"{len(todo) - 5} more things to do; --verbose lists all"
+        yield from more_line(len(faults) - len(shown), "curve")
+    todo = [f"what to do: {text}" for text in advice(study)]
+    yield from first_lines(
+        todo, None if is_verbose else 5, "thing to do", "things to do"
+    )
 
 
 def stability_verdict(study: Stability) -> str:

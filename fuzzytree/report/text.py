@@ -68,6 +68,27 @@ def some(words: Iterable[str], most: int, more: str = "more", joint: str = ", ")
     return joint.join(shown)
 
 
+def first_lines(
+    lines: Sequence[str], most: int | None, noun: str, nouns: str | None = None
+) -> Iterator[str]:
+    """Yield some lines, all if `most` is None, and how many more things there are."""
+    yield from lines[:most]
+    if most is not None:
+        yield from more_line(len(lines) - most, noun, nouns)
+
+
+def more_line(count: int, noun: str, nouns: str | None = None) -> Iterator[str]:
+    """Yield how many more things there are than are shown, if any.
+
+    Example:
+        >>> [*more_line(2, "change")]
+        ['and 2 more changes; --verbose lists all']
+    """
+    if count > 0:
+        more = counted(count, f"more {noun}", f"more {nouns or noun + 's'}")
+        yield f"and {more}; --verbose lists all"
+
+
 def duration(ns: float) -> str:
     """Return a time with three digits and the unit that fits.
 
@@ -111,7 +132,7 @@ def agreement_lines(
         shown = wrong[:_MOST_WRONG]
         if shown:
             yield from aligned([COMPARISON, *map(comparison_row, shown)])
-        yield from _more(len(wrong) - len(shown), "comparison")
+        yield from more_line(len(wrong) - len(shown), "comparison")
     for comparison in shown:
         if comparison.detail and (is_full or comparison in wrong):
             yield f"{comparison.representation} compared with {comparison.against}:"
@@ -124,9 +145,9 @@ def agreement_lines(
         )
     if agreement.coverage is not None:
         yield from agreement.coverage.sentences
-    most = len(agreement.skipped) if is_verbose else _MOST_SKIPPED
-    yield from (f"not examined: {text}" for text in agreement.skipped[:most])
-    yield from _more(len(agreement.skipped[most:]), "item", "not examined")
+    skipped = [f"not examined: {text}" for text in agreement.skipped]
+    most = None if is_verbose else _MOST_SKIPPED
+    yield from first_lines(skipped, most, "item not examined", "items not examined")
     yield from _bound_lines(agreement.certificates, is_verbose=is_verbose)
 
 
@@ -160,12 +181,6 @@ def _bound_lines(bounds: Sequence[Certified], *, is_verbose: bool) -> Iterator[s
     for one in wrong:
         yield f"{one.representation} compared with exact arithmetic:"
         yield from (f"  {line}" for line in one.detail)
-
-
-def _more(count: int, noun: str, after: str = "not shown") -> Iterator[str]:
-    """Yield how many things are not shown, if there are any."""
-    if count > 0:
-        yield f"{counted(count, f'more {noun}')} {after}; --verbose lists all"
 
 
 _MOST_WRONG = 8  # comparisons that do not agree, unless all are printed

@@ -321,4 +321,4 @@ def test_a_long_list_ends_with_a_count() -> None:
     variable = Variable("force", (SOFT, *terms))
     rules = RuleBase("grip", ("a",), (variable,), (rule,))
     lines = list(report_lines(report(rules, pruned(rules))))
-    assert "and 14 more; --verbose lists all" in lines
+    assert "and 14 more parts; --verbose lists all" in lines
