@@ -219,9 +219,6 @@ class ExactPrediction(NamedTuple):
     label: str | None  # the class, or None for no class
     rule: int  # the number of the winning rule, 0 if none fires
     is_tie: bool  # whether another rule is as strong
-    # how far the strongest class is ahead of the next; not firing counts as a class of
-    # strength 0
-    margin: Fraction
 
 
 def prediction_at(rules: RuleBase, point: Mapping[str, Fraction]) -> ExactPrediction:
@@ -235,14 +232,10 @@ def prediction_at(rules: RuleBase, point: Mapping[str, Fraction]) -> ExactPredic
     strengths = rule_strengths(rules, point)
     best = max(strengths)
     if best == 0:
-        return ExactPrediction(rules.semantics.uncovered, 0, False, ZERO)
+        return ExactPrediction(rules.semantics.uncovered, 0, False)
     winner = strengths.index(best)
-    label = rules.rules[winner].then
-    others = [
-        s for s, rule in zip(strengths, rules.rules, strict=True) if rule.then != label
-    ]
-    margin = best - max(others, default=ZERO)
-    return ExactPrediction(label, winner + 1, strengths.count(best) > 1, margin)
+    is_tie = strengths.count(best) > 1
+    return ExactPrediction(rules.rules[winner].then, winner + 1, is_tie)
 
 
 def difference_at(
