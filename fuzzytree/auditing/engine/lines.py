@@ -34,9 +34,9 @@ from fuzzytree.semantics import Enclosed, Interval, Jet, degree_bounds, jet
 APART: Final = Fraction(1, 1 << 10)
 """How far two lines around a function are apart at most, where their number allows."""
 
-_MOST_BLOCKS: Final = 256  # between two knots of a curve; each with a bound of its bend
+_MOST_BLOCKS: Final = 160  # between two knots of a curve; each with a bound of its bend
 _PARTS: Final = 8  # of a block at most; each with two lines around the curve
-_MORE: Final = 1 + Fraction(1, 1 << 20)  # for what rounding takes
+_MORE: Final = 1 + 2.0**-20  # for what rounding takes
 _GRID: Final = 1 << 32  # bounds are multiples of 1 by this
 
 
@@ -278,9 +278,9 @@ def _block(function: MembershipFunction, a: Fraction, b: Fraction) -> _Block:
     if range_[0] == range_[1] or not math.isfinite(known.bend.size):
         return _Block(((a, b),), None, range_)
     bend = Fraction(known.bend.low), Fraction(known.bend.high)
-    off = max(bend[1], ZERO) + max(-bend[0], ZERO)
-    needed = math.ceil((b - a) * Fraction(math.sqrt(off / APART / 8)) * _MORE)
-    count = min(max(needed, 1), _PARTS)
+    off = max(known.bend.high, 0.0) + max(-known.bend.low, 0.0)
+    needed = (float(b) - float(a)) * math.sqrt(off / (8 * float(APART))) * _MORE
+    count = math.ceil(min(max(needed, 1.0), _PARTS))
     inner = (Fraction(float(a + (b - a) * k / count)) for k in range(1, count))
     places = sorted({a, b, *(x for x in inner if a < x < b)})
     return _Block((*itertools.pairwise(places),), bend, range_)

@@ -18,6 +18,8 @@ from fuzzytree.model import (
     Points,
     SCurve,
     Side,
+    Sigmoid,
+    SigmoidProduct,
 )
 from fuzzytree.numerics import degree_between
 from fuzzytree.semantics.inference.degrees import hedged
@@ -66,3 +68,14 @@ def test_a_single_value_has_the_degree_of_the_curve(curve: MembershipFunction) -
     known = lines_of(curve, x, x)
     assert known.lower.x == known.upper.x == (x,)
     assert 0 <= known.upper.at[0] - known.lower.at[0] <= Fraction(1, 1 << 30)
+
+
+def test_a_curve_of_any_steepness_has_lines() -> None:
+    for slope in (1e16, 1e300):
+        steep = SigmoidProduct(Sigmoid(0.0, 5e-15), Sigmoid(-4e-6, slope))
+        known = lines_of(steep, LOW, HIGH)
+        for x in places(known):
+            true = degree_between(steep, x)
+            assert true is not None
+            assert known.lower.value(x) <= true.high
+            assert known.upper.value(x) >= true.low
