@@ -824,9 +824,14 @@ def explain(code: str) -> auditing.Code:
 
 
 def recheck(
-    audit: str | os.PathLike[str], model: str | os.PathLike[str]
+    audit: str | os.PathLike[str],
+    model: str | os.PathLike[str],
+    *,
+    new: str | os.PathLike[str] | None = None,
 ) -> auditing.Report:
     """Check the JSON file of an audit against the YAML file of its model, on its own.
+
+    With `new`, it is the JSON file of a comparison of `model` with this other model.
 
     The report's `wrong` lists what does not hold; `lines()` is what the command prints.
 
@@ -834,7 +839,8 @@ def recheck(
         ReadError: If one of the files cannot be read.
     """
     try:
-        return auditing.recheck_files(os.fspath(audit), os.fspath(model))
+        paths = [audit, model] if new is None else [audit, model, new]
+        return auditing.recheck_files(*[os.fspath(one) for one in paths])
     except auditing.CannotRunError as error:
         raise ReadError(str(error)) from error
 
