@@ -310,7 +310,7 @@ class LevelAxis:
 
 
 class _Coded(NamedTuple):
-    """Lines ready for many levels: each height once, places as doubles as well."""
+    """Lines ready for many levels: heights in order, places as doubles as well."""
 
     places: tuple[tuple[float, Fraction], ...]
     heights: tuple[Fraction, ...]
@@ -321,7 +321,7 @@ class _Coded(NamedTuple):
 
 
 def _coded(lines: Lines) -> _Coded:
-    heights = {height: number for number, height in enumerate(lines.values)}
+    heights = {height: number for number, height in enumerate(sorted(lines.values))}
     at, after, before = (
         tuple(heights[height] for height in of)
         for of in (lines.at, lines.after, lines.before)
@@ -347,7 +347,10 @@ def _changes(
     The first and the last place are among them. A place is a double and a fraction, as
     doubles are faster to sort.
     """
-    sides = [(height > level) - (height < level) for height in lines.heights]
+    least = bisect_left(lines.heights, level)
+    sides = [-1] * least + [1] * (len(lines.heights) - least)
+    if least < len(lines.heights) and lines.heights[least] == level:
+        sides[least] = 0
     last, end = None, len(lines.after)
     for number, (near, x) in enumerate(lines.places):
         here = sides[lines.at[number]]
