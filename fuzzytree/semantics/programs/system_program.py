@@ -77,7 +77,7 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
 
     Example:
         >>> from fuzzytree.semantics.programs.evaluate import evaluate_program
-        >>> from fuzzytree.model import Conclusion, Defuzzifier, Points
+        >>> from fuzzytree.model import Conclusion, Defuzzifier, Points, Variable
         >>> dirty = Term("dirty", Points((0.0, 10.0), (0.0, 1.0)))
         >>> long = Term("long", Singleton(60.0))
         >>> system = FuzzySystem(
