@@ -452,8 +452,12 @@ def _witness(case: Case, report: Report, answer: Answer, state: Witness) -> None
     is_same = answer.region in ((), state.region)
     require(is_same, "the answer's region is not that of its witness")
     require(bool(state.claims), "a witness of which nothing is claimed")
-    levels = [claim.rules for claim in state.claims if claim.kind == "strength"]
-    is_own = not levels or not answer.rules or {*levels[0]} <= {*answer.rules}
+    levels = [claim for claim in state.claims if claim.kind == "strength"]
+    is_own = not levels or not answer.rules
+    if not is_own:  # the first rule of the answer that is so strong
+        same = (levels[0]._replace(rules=(n,)) for n in answer.rules)
+        first = next((one for one in same if case.holds(one, point)), None)
+        is_own = levels[0] == first
     require(is_own, "the strength of another rule is claimed")
     check_spans(case, state.region)
     for span in state.region:
