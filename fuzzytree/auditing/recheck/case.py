@@ -242,13 +242,18 @@ class Case:
                     chance.randrange(1025), 1024
                 )
             points += [point] if self.is_within(point) else []
-        return [strengths(self.rules, point, CLOSE) for point in points]
+        result: list[list[Between]] = []
+        for point in points:
+            self.limit.spend(len(self.rules.rules))
+            result.append(strengths(self.rules, point, CLOSE))
+        return result
 
     @cached_property
     def above(self) -> dict[int, set[int]]:
         """For each rule those known to be above it somewhere; for 0 those that fire."""
         result: dict[int, set[int]] = {n: set() for n in (0, *self.numbers)}
         for one in self.known:
+            self.limit.spend(len(one) ** 2)
             for n, (_, most) in enumerate([(ZERO, ZERO), *one]):
                 result[n] |= {m for m in self.numbers if one[m - 1][0] > most}
         return result
