@@ -149,6 +149,8 @@ def _proved_twice(result: Audit, model: Document, clock: Clock) -> Audit:
     bare = msgspec.structs.replace(result, file=None, answers=tuple(moved))
 
     def weak() -> Mapping[int, str]:
+        if clock.is_over:
+            raise CannotRunError("the budget was spent")
         content = find_format("yaml").write(model).content
         return undecided(msgspec.json.encode(bare), content, lambda: clock.is_over)
 
