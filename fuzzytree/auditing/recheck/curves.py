@@ -276,13 +276,38 @@ def _semi_ellipse(x: Fraction, start: Fraction, end: Fraction) -> Between:
     return _root(1 - u * u)
 
 
+def _gaussian(x: Fraction, mean: Fraction, deviation: Fraction) -> Between:
+    return _falling(((x - mean) / deviation) ** 2 / 2)
+
+
+def _left_half(x: Fraction, mean: Fraction, deviation: Fraction) -> Between:
+    return _gaussian(min(x, mean), mean, deviation)
+
+
+def _right_half(x: Fraction, mean: Fraction, deviation: Fraction) -> Between:
+    return _gaussian(max(x, mean), mean, deviation)
+
+
+def _sigmoid(x: Fraction, inflection: Fraction, slope: Fraction) -> Between:
+    return _logistic(slope * (x - inflection))
+
+
+def _spike(x: Fraction, center: Fraction, width: Fraction) -> Between:
+    return _falling(10 * abs(x - center) / width)
+
+
+def _s_curve(x: Fraction, start: Fraction, end: Fraction) -> Between:
+    degree = _s(x, start, end)
+    return degree, degree
+
+
 DEGREES: dict[str, Callable[..., Between]] = {
-    "gaussian": lambda x, mean, deviation: _falling(((x - mean) / deviation) ** 2 / 2),
-    "left half": lambda x, mean, d: _falling((min(x - mean, ZERO) / d) ** 2 / 2),
-    "right half": lambda x, mean, d: _falling((max(x - mean, ZERO) / d) ** 2 / 2),
-    "sigmoid": lambda x, inflection, slope: _logistic(slope * (x - inflection)),
-    "spike": lambda x, center, width: _falling(10 * abs(x - center) / width),
-    "s": lambda x, start, end: (_s(x, start, end), _s(x, start, end)),
+    "gaussian": _gaussian,
+    "left half": _left_half,
+    "right half": _right_half,
+    "sigmoid": _sigmoid,
+    "spike": _spike,
+    "s": _s_curve,
     "bell": _bell,
     "cosine": _cosine,
     "concave": _concave,
@@ -296,12 +321,22 @@ def _sigmoids(*both: tuple[float, ...]) -> list[Curve]:
     return [Curve("sigmoid", one) for one in both]
 
 
+def _halves(
+    left: float, left_deviation: float, right: float, right_deviation: float
+) -> list[Curve]:
+    return [
+        Curve("left half", (left, left_deviation)),
+        Curve("right half", (right, right_deviation)),
+    ]
+
+
+def _slopes(a: float, b: float, c: float, d: float) -> list[Curve]:
+    return [Curve("s", (a, b)), Curve("s", (d, c))]
+
+
 PAIRS: dict[str, Callable[..., list[Curve]]] = {
-    "two gaussians": lambda a, p, b, q: [
-        Curve("left half", (a, p)),
-        Curve("right half", (b, q)),
-    ],
-    "pi": lambda a, b, c, d: [Curve("s", (a, b)), Curve("s", (d, c))],
+    "two gaussians": _halves,
+    "pi": _slopes,
     "sigmoid product": _sigmoids,
     "sigmoid difference": _sigmoids,
 }
