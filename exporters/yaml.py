@@ -140,6 +140,8 @@ def _names(model: Document) -> Iterator[tuple[str, str]]:
     for variable in model.variables + outputs:
         yield "variable", variable.name
         yield "unit", variable.unit
+        if not isinstance(variable, SystemOutput):
+            yield from (("category", name) for name in variable.categories)
         yield from (("term", term.name) for term in variable.terms)
     if isinstance(model, FuzzyTree):
         yield from (("pattern", leaf.pattern) for leaf in model.leaves)
@@ -220,6 +222,8 @@ def _variable(variable: Variable | SystemOutput) -> dict[str, Entry]:
     entries: dict[str, Entry] = {"name": variable.name}
     if variable.unit:
         entries["unit"] = variable.unit
+    if not isinstance(variable, SystemOutput):
+        entries |= _column(variable)
     ends = range_ends(variable.low, variable.high)
     if variable.clips:
         ends["outside"] = "clipped"
@@ -229,6 +233,15 @@ def _variable(variable: Variable | SystemOutput) -> dict[str, Entry]:
         entries["sum of"] = [*map(summand, variable.parts)]
     if variable.terms:
         entries["terms"] = [*map(_term, variable.terms)]
+    return entries
+
+
+def _column(variable: Variable) -> dict[str, Entry]:
+    entries: dict[str, Entry] = {}
+    if variable.categories:
+        entries["categories"] = Short([*variable.categories], is_run_on=True)
+    if variable.missing is not None:
+        entries["missing as"] = float(variable.missing)
     return entries
 
 

@@ -304,6 +304,8 @@ def _renamed(part: Any, names: _NewNames) -> Any:
                 high=part.high if part.clips else None,
                 clips=part.clips,
                 parts=new(part.parts),
+                categories=part.categories,
+                missing=part.missing,
             )
         case Sets(variable=name, terms=terms):
             renamed = _terms(terms, names.sets[name], names, are_numbers=False)

@@ -165,4 +165,5 @@ from .variables import Part as Part
 from .variables import Term as Term
 from .variables import Variable as Variable
 from .variables import shapes_of as shapes_of
+from .variables import stand_ins as stand_ins
 from .variables import variable_mistakes as variable_mistakes

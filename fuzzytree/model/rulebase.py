@@ -32,9 +32,11 @@ from fuzzytree.model.variables import Part as Part
 from fuzzytree.model.variables import Term as Term
 from fuzzytree.model.variables import Variable as Variable
 from fuzzytree.model.variables import shapes_of as shapes_of
+from fuzzytree.model.variables import stand_ins as stand_ins
 from fuzzytree.model.variables import term_names as term_names
 from fuzzytree.model.variables import variable_mistakes as variable_mistakes
 
+_NO_COLUMN = b',"categories":[],"missing":null}'  # in no text: quotes are escaped there
 _ONE = {"leaves": "leaf", "classes": "class", "losses": "loss"}
 
 
@@ -181,9 +183,11 @@ def fingerprint(value: msgspec.Struct) -> str:
     """Return the SHA-256 of a model's content, as 64 hexadecimal digits.
 
     Equal models have equal fingerprints on every machine; numbers enter with all
-    their digits.
+    their digits. Variables without categories and stand-ins have the fingerprints
+    that they had before variables could have them.
     """
-    return hashlib.sha256(msgspec.json.encode(value)).hexdigest()
+    content = msgspec.json.encode(value).replace(_NO_COLUMN, b"}")
+    return hashlib.sha256(content).hexdigest()
 
 
 def label_type_of(labels: Iterable[object]) -> LabelType | msgspec.UnsetType:

@@ -243,6 +243,9 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
         path: Path = ("variables", position)
         yield from input_mistakes(path, one, known)
         yield from _term_mistakes(path, one, count, nameable)
+        if one.categories or one.missing is not None:
+            text = "only rule bases and trees have categories and stand-ins"
+            yield path, f"{text}, such as those of {one.name!r}"
         if one.clips and one.low is None and one.high is None:
             yield path, f"input {one.name!r} is clipped to a range that it lacks"
     for position, output in enumerate(system.outputs):

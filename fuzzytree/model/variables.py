@@ -63,6 +63,12 @@ class Variable(Value, frozen=True):
             added in this order, each operation rounded once to double.
         clips: Whether values are first moved into the range, of which one end may be
             open; only in fuzzy systems.
+        categories: The texts of a categorical input, sorted; the value of each is its
+            position, from 0. Empty for numbers.
+        missing: The value that stands for one that is missing, not finite or no
+            category: a point of the input space like any other. None if such a row
+            is answered by the policy of the model (`Semantics.missing`). Only rule
+            bases and trees have it, for input columns.
     """
 
     name: str
@@ -72,6 +78,18 @@ class Variable(Value, frozen=True):
     high: float | None = None
     parts: tuple[Part, ...] = ()
     clips: bool = False
+    categories: tuple[str, ...] = ()
+    missing: float | None = None
+
+
+def stand_ins(variables: Iterable[Variable]) -> dict[str, float]:
+    """Return the value that stands for a missing one, by input.
+
+    Example:
+        >>> stand_ins([Variable("age", missing=30.0), Variable("mass")])
+        {'age': 30.0}
+    """
+    return {v.name: v.missing for v in variables if v.missing is not None}
 
 
 def shapes_of(variables: Iterable[Variable]) -> dict[tuple[str, str], Shape]:
@@ -109,6 +127,27 @@ def variable_mistakes(
                 path,
                 f"only a fuzzy system clips its inputs, such as {variable.name!r}",
             )
+        yield from _column_mistakes(path, variable)
+
+
+def _column_mistakes(path: Path, variable: Variable) -> Iterator[Mistake]:
+    """Yield what is wrong with categories and with what stands for a missing value."""
+    name, missing, last = variable.name, variable.missing, len(variable.categories) - 1
+    yield from name_mistakes(
+        (*path, "categories"), f"category of {name!r}", variable.categories
+    )
+    if variable.parts and (variable.categories or missing is not None):
+        yield path, f"only an input has categories or stand-ins, not the sum {name!r}"
+    if missing is None:
+        return
+    if not math.isfinite(missing):
+        yield (*path, "missing"), f"what stands for a missing {name!r} must be finite"
+    elif variable.categories and missing not in range(-1, last + 1):
+        yield (
+            (*path, "missing"),
+            f"what stands for a missing {name!r} is -1 or the position of a category, "
+            f"up to {last}, not {missing!r}",
+        )
 
 
 def input_mistakes(

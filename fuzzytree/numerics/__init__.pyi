@@ -16,6 +16,7 @@ from .enclosures import Enclosure as Enclosure
 from .enclosures import U as U
 from .enclosures import axis_value as axis_value
 from .enclosures import degree_enclosure as degree_enclosure
+from .enclosures import filled_values as filled_values
 from .enclosures import proposition_enclosure as proposition_enclosure
 from .enclosures import strength_enclosure as strength_enclosure
 from .exact import CAP as CAP

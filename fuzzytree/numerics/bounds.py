@@ -34,7 +34,7 @@ from fuzzytree.model import (
     RuleBase,
     Variable,
 )
-from fuzzytree.numerics.enclosures import axis_value
+from fuzzytree.numerics.enclosures import axis_value, filled_values
 from fuzzytree.numerics.rounding import (
     FLOAT32_MAX,
     MORE,
@@ -81,6 +81,7 @@ def strength_bounds(
         so close to a step that rounding can put it on the other side. Rows with
         missing values have the bound 0: there is nothing to compute.
     """
+    values = filled_values(rules.variables, values)
     bounds = _term_bounds(rules, dtype)
     found = np.zeros(values.shape[1])
     with np.errstate(all="ignore"):
@@ -288,6 +289,7 @@ def certify(
 
 
 def _certify_rows(rules: RuleBase, dtype: Dtype, values: FloatArray) -> Certificate:
+    values = filled_values(rules.variables, values)
     allowed, origin = strength_bounds(rules, dtype, values)
     is_bound = allowed < 1.0
     known = np.isfinite(values).all(axis=0)
@@ -436,6 +438,7 @@ def _certify_tree(
         ranges, where, rows = _declared(tree), "for values in the declared ranges", None
     else:
         rows = values.shape[1]
+        values = filled_values(tree.variables, values)
         known = values[:, np.isfinite(values).all(axis=0)]
         ranges, where = _spans(known, tree.inputs), f"in {rows} rows"
     largest = {
@@ -482,6 +485,7 @@ def open_paths(tree: FuzzyTree, dtype: Dtype, values: FloatArray) -> BoolArray:
         values: Shape (inputs, rows).
     """
     kind = TYPES[dtype]
+    values = filled_values(tree.variables, values)
     named = dict(zip(tree.inputs, values, strict=True))
     ranges = {name: (line, line) for name, line in named.items()}
     found: BoolArray = np.zeros(values.shape[1], np.bool_)

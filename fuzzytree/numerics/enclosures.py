@@ -86,6 +86,24 @@ class Enclosure(NamedTuple):
     high: FloatArray
 
 
+def filled_values(variables: Sequence[Variable], values: FloatArray) -> FloatArray:
+    """Return rows with the stand-ins in the place of values that are not finite.
+
+    `values` has shape (inputs, rows); it is returned as it is if nothing is replaced.
+
+    Example:
+        >>> filled_values([Variable("age", missing=30.0)], np.array([[7.0, np.nan]]))
+        array([[ 7., 30.]])
+    """
+    known = [v.missing for v in variables if not v.parts]
+    if not any(one is not None for one in known) or np.isfinite(values).all():
+        return values
+    stand = np.array([[np.nan if one is None else one] for one in known])
+    replaced = ~np.isfinite(values) & np.isfinite(stand)
+    filled: FloatArray = np.where(replaced, stand, values)
+    return filled
+
+
 def axis_value(variable: Variable, values: Mapping[str, FloatArray]) -> EnclosedValue:
     """Return the value of a variable by its chain of doubles, and how far it is off.
 

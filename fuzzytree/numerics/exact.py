@@ -85,6 +85,8 @@ def exact_answer(model: Model, row: Mapping[str, float]) -> Exact:
         >>> exact_answer(rules, {"force": 2.0}).strengths
         (Fraction(2, 3),)
     """
+    stand = {v.name: v.missing for v in model.variables if v.missing is not None}
+    row = {n: x if math.isfinite(x) else stand.get(n, x) for n, x in row.items()}
     if any(is_missing(variable, row) for variable in model.variables):
         return Exact(0, model.semantics.missing, MISSING, (), _ONE)
     if isinstance(model, RuleBase):

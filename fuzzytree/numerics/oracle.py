@@ -37,6 +37,7 @@ from fuzzytree.numerics.enclosures import (
     U,
     axis_value,
     degree_enclosure,
+    filled_values,
     proposition_enclosure,
     strength_enclosure,
 )
@@ -214,6 +215,7 @@ def _axes(
     model: Model, values: FloatArray
 ) -> tuple[dict[str, EnclosedValue], BoolArray]:
     """Return the value of each variable, and which rows miss one."""
+    values = filled_values(model.variables, values)
     named = dict(zip(model.inputs, values, strict=True))
     axes = {v.name: axis_value(v, named) for v in model.variables}
     missing: BoolArray = np.zeros(values.shape[1], np.bool_)

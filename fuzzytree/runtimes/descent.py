@@ -420,7 +420,7 @@ def follow(tree: FuzzyTree, dtype: Dtype = "float64") -> Run:
 
 def descend_by(axes: Axes, descent: Descent, inputs: tuple[str, ...]) -> Run:
     """Return a function that descends planned splits on planned axes."""
-    is_plain = not axes.steps and axes.dtype == np.float64
+    is_plain = not axes.steps and axes.dtype == np.float64 and axes.stand_ins is None
 
     def run(values: FloatArray) -> Outcome:
         array = checked(values, inputs)

@@ -7,6 +7,7 @@ operations are few and wide; the longer ones stand first.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.model import Model, Outcome, Part, RuleBase, Variable
+from fuzzytree.model import Model, Outcome, Part, RuleBase, Variable, stand_ins
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -120,6 +121,8 @@ class Axes:
         chains: The combinations again, for a single row: (line, weight, centre) of
             each part.
         dtype: In what the chain is computed.
+        stand_ins: What replaces a value that is not finite, for each input, of shape
+            (inputs, 1); NaN where nothing does. None if no input has one.
     """
 
     line: dict[str, int]
@@ -127,6 +130,7 @@ class Axes:
     steps: tuple[PartsAt, ...]
     chains: tuple[tuple[tuple[int, float, float], ...], ...]
     dtype: Real
+    stand_ins: Reals | None = None
 
     @property
     def count(self) -> int:
@@ -153,7 +157,9 @@ def plan_axes(
         tuple((line[part.input], part.weight, part.centre) for part in v.parts)
         for v in mixed
     )
-    return Axes(line, len(inputs), steps, chains, kind)
+    known = stand_ins(variables)
+    stand = np.array([[known.get(name, np.nan)] for name in inputs], kind)
+    return Axes(line, len(inputs), steps, chains, kind, stand if known else None)
 
 
 def _step(
@@ -172,9 +178,12 @@ def axis_lines(axes: Axes, values: FloatArray) -> Reals:
     """Return the value of every variable, of shape (variables, rows).
 
     `values` has shape (inputs, rows); it is returned as it is if the plan has no
-    combinations and computes in doubles.
+    combinations and computes in doubles, and nothing is replaced.
     """
     base: Reals = values.astype(axes.dtype, copy=False)
+    if axes.stand_ins is not None and not np.isfinite(base.sum()):
+        replaced = ~np.isfinite(base) & np.isfinite(axes.stand_ins)
+        base = np.where(replaced, axes.stand_ins, base)
     if not axes.steps:
         return base
     lines = np.empty((axes.count, values.shape[1]), axes.dtype)
@@ -194,10 +203,14 @@ def axis_lines(axes: Axes, values: FloatArray) -> Reals:
 def axis_row(axes: Axes, row: list[float]) -> list[float]:
     """Return the value of every variable for a single row, in double."""
     values = row.copy()
+    if axes.stand_ins is not None and not math.isfinite(sum(row)):
+        for line, stand in enumerate(axes.stand_ins[:, 0].tolist()):
+            if not (math.isfinite(row[line]) or math.isnan(stand)):
+                values[line] = stand
     for (line, weight, centre), *others in axes.chains:
-        total = weight * (row[line] - centre)
+        total = weight * (values[line] - centre)
         for line, weight, centre in others:
-            total = total + weight * (row[line] - centre)
+            total = total + weight * (values[line] - centre)
         values.append(total)
     return values
 

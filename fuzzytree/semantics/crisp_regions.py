@@ -21,7 +21,6 @@ from fuzzytree.model import (
     Node,
     Proposition,
     RuleBase,
-    Variable,
     shapes_of,
 )
 from fuzzytree.semantics.reference import proposition_degree
@@ -36,11 +35,7 @@ def free_axes(model: _Model) -> _Model:
     model is a point on the axes that the old one uses.
     """
     used = {variable.name for variable in model.variables if variable.terms}
-    variables = tuple(
-        Variable(v.name, v.terms, v.unit, v.low, v.high)
-        for v in model.variables
-        if v.name in used
-    )
+    variables = tuple(replace(v, parts=()) for v in model.variables if v.name in used)
     return replace(model, variables=variables, columns=())
 
 

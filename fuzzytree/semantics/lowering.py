@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping
 from typing import Literal
 
 import msgspec
+from msgspec.structs import replace
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.model import (
@@ -117,10 +118,7 @@ def _variables(tree: FuzzyTree, kind: Kind) -> tuple[Variable, ...]:
         terms = {v.name: v.terms for v in tree.variables}
     else:
         terms = {s.variable: s.terms for s in tree.sets}
-    return tuple(
-        Variable(v.name, terms.get(v.name, ()), v.unit, v.low, v.high, v.parts)
-        for v in tree.variables
-    )
+    return tuple(replace(v, terms=terms.get(v.name, ())) for v in tree.variables)
 
 
 def _rules(tree: FuzzyTree, kind: Kind) -> tuple[Rule, ...]:

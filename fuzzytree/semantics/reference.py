@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from enum import IntEnum
 
 import msgspec
@@ -25,6 +25,7 @@ from fuzzytree.model import (
     Side,
     Variable,
     shapes_of,
+    stand_ins,
 )
 
 BELOW_ONE = 1.0 - 2.0**-53
@@ -131,19 +132,39 @@ def axis_values(
 ) -> dict[str, float]:
     """Return the value of each variable: the input, or the sum of its parts in order.
 
-    A combination is `w1 (x1 - c1) + w2 (x2 - c2) + ...`, rounded after each step.
+    A value that is not finite is replaced by what stands for a missing one, if the
+    input has such a value. A combination is `w1 (x1 - c1) + w2 (x2 - c2) + ...`,
+    rounded after each step.
     """
+    known = filled_row(variables, row)
     axes: dict[str, float] = {}
     for variable in variables:
         if not variable.parts:
-            axes[variable.name] = float(row[variable.name])
+            axes[variable.name] = known[variable.name]
             continue
         first, *others = variable.parts
-        total = first.weight * (float(row[first.input]) - first.centre)
+        total = first.weight * (known[first.input] - first.centre)
         for part in others:
-            total = total + part.weight * (float(row[part.input]) - part.centre)
+            total = total + part.weight * (known[part.input] - part.centre)
         axes[variable.name] = total
     return axes
+
+
+def filled_row(
+    variables: Iterable[Variable], row: Mapping[str, float]
+) -> dict[str, float]:
+    """Return a row with the stand-ins in the place of values that are not finite.
+
+    Example:
+        >>> age = Variable("age", missing=30.0)
+        >>> filled_row([age], {"age": math.nan}), filled_row([age], {"age": 7.0})
+        ({'age': 30.0}, {'age': 7.0})
+    """
+    known = {name: float(value) for name, value in row.items()}
+    for name, value in stand_ins(variables).items():
+        if not math.isfinite(known[name]):
+            known[name] = value
+    return known
 
 
 def proposition_degree(

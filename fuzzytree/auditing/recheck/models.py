@@ -525,7 +525,7 @@ def _places(items: Any) -> list[Place]:
 
 
 def _variable(one: Facts) -> Variable:
-    keys(one, "name", "terms, unit, range, sum of")
+    keys(one, "name", "terms, unit, range, sum of, categories, missing as")
     ends = one.get("range", {})
     if ends.keys() - {"from", "to", "outside"}:
         raise CannotRunError("a range with other ends")

@@ -28,7 +28,7 @@ from fuzzytree.model import (
     Runtime,
     kind_of,
 )
-from fuzzytree.numerics import Decisions, decide, strength_bounds
+from fuzzytree.numerics import Decisions, decide, filled_values, strength_bounds
 from fuzzytree.runtimes import is_installed, needed_by
 from fuzzytree.semantics import forms
 
@@ -238,6 +238,7 @@ def missing_rows(model: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
         [False, True, True]
     """
     kind = np.dtype(np.float32 if dtype == "float32" else np.float64)
+    values = filled_values(model.variables, values)
     with np.errstate(all="ignore"):
         axes = dict(zip(model.inputs, values.astype(kind), strict=True))
         known = np.ones(values.shape[1], np.bool_)

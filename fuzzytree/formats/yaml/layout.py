@@ -252,11 +252,17 @@ else:  # with a field for each function that is written as its numbers
 
 
 class VariableOfModel(FileRecord, frozen=True, kw_only=True):
-    """An input column, or a sum of weighted inputs, with its terms."""
+    """An input column, or a sum of weighted inputs, with its terms.
+
+    The values of a column of text are the positions of its `categories`, from 0.
+    `missing as` stands for a value that is missing, infinite or no category.
+    """
 
     noun: ClassVar[str] = "a variable"
     name: Name
     unit: Name | None = None
+    categories: tuple[Name, ...] = ()
+    missing_as: float | None = field(name="missing as", default=None)
     range: RangeOfVariable | None = None
     sum_of: tuple[PartOfSum, ...] = field(name="sum of", default=())
     terms: tuple[TermOfVariable, ...] = ()

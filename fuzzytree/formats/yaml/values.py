@@ -64,6 +64,8 @@ def variable(
         high=high,
         parts=tuple(Part(p.input, p.weight, p.centre) for p in one.sum_of),
         clips=clips,
+        categories=one.categories,
+        missing=one.missing_as,
     )
 
 

@@ -88,7 +88,8 @@ def input_values(
 ) -> tuple[Place, dict[str, Place]]:
     """Return whether all values are finite, and each variable's value in its range.
 
-    A combination is the sum of its parts in order.
+    A combination is the sum of its parts in order. What stands for a missing value
+    replaces one that is not finite.
     """
     results: list[Place] = []
     values: dict[str, Place] = {}
@@ -96,6 +97,9 @@ def input_values(
         with make.topic(one.name):
             terms = [p.weight * (values[p.input] - p.centre) for p in one.parts]
             value = make.chain("add", terms) if terms else make.input(one.name)
+            if one.missing is not None:
+                is_known = make("is_finite", value)
+                value = make.where(is_known, value, one.missing)
             results.append(make.titled(value, one.name))
             values[one.name] = clamped(make, one, value) if one.clips else value
             make.titled(values[one.name], f"{one.name} clamped")
