@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
+from fuzzytree.cells import numbers_only
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import ArrayLearner, LearningReport, LearningSettings
 from fuzzytree.model import FuzzyTree, label_type_of, with_label_type
 from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import Status, rules_from_tree
-from fuzzytree.tables import numbers_only
 
 try:
     from sklearn.base import BaseEstimator, ClassifierMixin

@@ -33,6 +33,16 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from fuzzytree.cells import (
+    MISSING,
+    REAL,
+    distinct_values,
+    is_missing,
+    number_of,
+    numbers_only,
+    plain,
+    unmasked,
+)
 from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, counted, number_array
 from fuzzytree.errors import MissingExtraError, TableError
 from fuzzytree.files import LIMIT, check_stream, reason
@@ -43,7 +53,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from narwhals.typing import IntoDataFrame, IntoLazyFrame
 
-    Cells: TypeAlias = Sequence[object] | npt.NDArray[np.generic] | pa.ChunkedArray
+    from fuzzytree.cells import Cells
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -52,9 +62,6 @@ S = TypeVar("S")
 T = TypeVar("T")
 _Coded: TypeAlias = tuple[IntArray, list[tuple[str, bool]], str]
 _Faults = dict[str, tuple[str, str, int]]  # where the first is, its text, how many
-
-MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
-"""The texts, in small letters, that stand for a missing number."""
 
 SUFFIXES = (".csv", ".parquet", ".pq", ".arrow", ".feather")
 """How the names of files end that are tables in a folder."""
@@ -81,18 +88,10 @@ use, at most 8 and at most the environment's `OMP_NUM_THREADS`."""
 _CELLS = 1 << 18  # of a piece of a wide table
 _BUFFER = 1 << 16  # bytes of a column of a Parquet file that are read at a time
 _UNRETURNED = 64  # pieces of a mapped file that may stay in memory
-_REAL = frozenset("biuf")  # numpy's letters for truth values, integers, floats
 _MOST_NAMES = 20
-_NUMBERS = (bool, int, float, np.bool_, np.integer, np.floating)
-_NO_NUMBER = frozenset("cmMSV")  # complex, times, bytes
 _EMPTY = sorted({way(text) for text in MISSING for way in (str, str.upper, str.title)})
 _MISSING = f"(?i)^(?:{'|'.join(sorted(MISSING))})$"
 _DELIMITERS = (",", ";", "\t")
-_NUMBER = re.compile(
-    r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf|infinity|nan)",
-    re.IGNORECASE,
-)
-
 _ARROW, _PARQUET = b"ARROW1", b"PAR1"
 _NO_DELIMITER = '"\r\n\0'
 
@@ -583,27 +582,6 @@ def pieces(
             return iter([_frame_piece(source, name or "the table", only=only)])
 
 
-def numbers_only(array: npt.NDArray[np.generic], name: str) -> npt.NDArray[np.generic]:
-    """Return an array of numbers, NaN where it is masked.
-
-    Raises:
-        TableError: If it holds times, complex numbers or bytes.
-    """
-    if array.dtype.kind in _NO_NUMBER:
-        raise TableError(f"{name} holds {array.dtype}, and no numbers")
-    return unmasked(array)
-
-
-def unmasked(array: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
-    """Return an array whose masked cells are missing: NaN, or None in objects."""
-    if not np.ma.isMaskedArray(array) or array.dtype.kind in _NO_NUMBER:
-        return array
-    is_real = array.dtype.kind in _REAL
-    filled = np.ma.getdata(array).astype(np.float64 if is_real else object)
-    filled[np.ma.getmaskarray(array)] = math.nan if is_real else None
-    return filled
-
-
 def class_names(cells: Sequence[Cells]) -> list[str | None]:
     """Return the class of each row as text; None where it is missing.
 
@@ -623,18 +601,12 @@ def class_names(cells: Sequence[Cells]) -> list[str | None]:
 def _class_name(value: object, *, is_whole: bool) -> str | None:
     if isinstance(value, str):
         return str(value) if value.strip() else None  # numpy has its own texts
-    if _is_missing(value):
+    if is_missing(value):
         return None
     if isinstance(value, float):
         is_short = is_whole and math.isfinite(value)
         return str(int(value)) if is_short else repr(float(value))
     return str(value)
-
-
-def _is_missing(value: object) -> bool:
-    if value is None or type(value).__name__ in ("NAType", "NaTType"):
-        return True
-    return isinstance(value, float) and math.isnan(value)
 
 
 def class_order(label: str) -> tuple[bool, float, str]:
@@ -723,7 +695,7 @@ def coded_classes(cells: Cells) -> _Coded:
         >>> coded_classes([1.0, 2.0])[1:]
         ([('1.0', True), ('2.0', True)], 'number')
     """
-    indices, values = _distinct(cells)
+    indices, values = distinct_values(cells)
     keys: dict[tuple[str, bool], int] = {}
     places: list[int] = []
     labels: list[object] = []
@@ -739,25 +711,6 @@ def coded_classes(cells: Cells) -> _Coded:
     codes = np.array(places, np.int64)[indices] if len(indices) else indices
     is_csv = not isinstance(cells, Sequence | np.ndarray)
     return codes, [*keys], "csv" if is_csv else label_type_of(labels) or "text"
-
-
-def _distinct(cells: Cells) -> tuple[IntArray, Sequence[object]]:
-    """Return where the value of each cell is among values that rarely repeat."""
-    if isinstance(cells, np.ndarray) and cells.dtype.kind in _REAL:
-        numbers = cells.astype(np.float64) if cells.dtype.kind == "f" else cells
-        is_float = cells.dtype.kind == "f"  # whose bits tell -0.0 from 0.0
-        bits = numbers.view(np.int64) if is_float else np.ascontiguousarray(numbers)
-        distinct, indices = np.unique(bits, return_inverse=True)
-        return indices.astype(np.int64), distinct.view(numbers.dtype).tolist()
-    if hasattr(cells, "dictionary_encode") and len(cells):
-        encoded = cast("pa.ChunkedArray", cells).combine_chunks().dictionary_encode()
-        indices = np.from_dlpack(encoded.indices).astype(np.int64)
-        return indices, encoded.dictionary.to_pylist()
-    values = plain(cells)
-    if not {*map(type, values)} <= {str, type(None)}:  # 1, 1.0 and True are equal
-        return np.arange(len(values)), values
-    places = {value: place for place, value in enumerate(dict.fromkeys(values))}
-    return np.fromiter(map(places.__getitem__, values), np.int64), [*places]
 
 
 def _numbers_of(
@@ -817,30 +770,15 @@ def _quoted(column: str) -> str:
     return column if re.fullmatch(r"[\w.-]+", column) else repr(column)
 
 
-def plain(cells: Cells) -> Sequence[object]:
-    """Return cells as Python's own values."""
-    if isinstance(cells, np.ndarray) and cells.dtype.kind in "mM":
-        times = cast("npt.NDArray[np.datetime64]", cells)
-        return [None if np.isnat(time) else str(time) for time in times]
-    if isinstance(cells, np.ndarray):
-        return cast("Sequence[object]", cells.tolist())
-    if isinstance(cells, Sequence):
-        return cells
-    result: list[object] = (  # a pandas or polars series is no Sequence either
-        cells.to_pylist() if hasattr(cells, "to_pylist") else [*cells]
-    )
-    return result
-
-
 def _numbers(cells: Cells) -> tuple[FloatArray, list[int]]:
     """Return cells as numbers, NaN where missing, and the positions of the others."""
-    if isinstance(cells, np.ndarray) and cells.dtype.kind in _REAL:
+    if isinstance(cells, np.ndarray) and cells.dtype.kind in REAL:
         return cells.astype(np.float64), []
     if len(cells) and not isinstance(cells, np.ndarray | Sequence):
         parsed = _parsed([cells])
         if parsed is not None:
             return parsed, []
-    result = [_number(cell) for cell in plain(cells)]
+    result = [number_of(cell) for cell in plain(cells)]
     bad = [row for row, value in enumerate(result) if value is None]
     filled = [math.nan if value is None else value for value in result]
     return np.array(filled, np.float64), bad
@@ -849,8 +787,8 @@ def _numbers(cells: Cells) -> tuple[FloatArray, list[int]]:
 def _parsed(columns: Sequence[pa.ChunkedArray]) -> FloatArray | None:
     """Return columns of text as numbers, one after another; None if not all are.
 
-    What this parses is the same double as `_number` makes of it. What is rare, such
-    as infinity and blanks of other scripts, is left to `_number`.
+    What this parses is the same double as `number_of` makes of it. What is rare, such
+    as infinity and blanks of other scripts, is left to `number_of`.
     """
     import pyarrow as pa
     import pyarrow.compute as pc
@@ -873,20 +811,6 @@ def _parsed(columns: Sequence[pa.ChunkedArray]) -> FloatArray | None:
         if np.count_nonzero(np.isfinite(values)) == len(values) - missing:
             return cast("FloatArray", values)
     return None
-
-
-def _number(cell: object) -> float | None:
-    """Return a cell as a number, NaN if it is missing, None if it is something else."""
-    if isinstance(cell, str):
-        text = cell.strip()
-        if text.lower() in MISSING:
-            return math.nan
-        return float(text) if _NUMBER.fullmatch(text) else None
-    if _is_missing(cell):
-        return math.nan
-    is_number = isinstance(cell, _NUMBERS) or type(cell).__name__ == "Decimal"
-    is_number = is_number and not isinstance(cell, np.timedelta64)
-    return float(cast("float", cell)) if is_number else None
 
 
 def trimmed(piece: TablePiece) -> list[tuple[str, str]]:
@@ -1305,9 +1229,7 @@ def _array_piece(
     array = unmasked(array)
     cells = tuple(array[:, k] for k in range(width))
     is_named = columns is not None
-    whole = (
-        array.astype(np.float64, copy=False).T if array.dtype.kind in _REAL else None
-    )
+    whole = array.astype(np.float64, copy=False).T if array.dtype.kind in REAL else None
     named = _named(name, written)
     return TablePiece(name, named, cells, count, where, written, is_named, whole)
 

@@ -10,9 +10,10 @@ import struct
 import pytest
 
 from fuzzytree import csv_rows, tables
+from fuzzytree.cells import plain
 from fuzzytree.csv_rows import count_breaks
 from fuzzytree.errors import TableError
-from fuzzytree.tables import batches, pieces, plain, read_table
+from fuzzytree.tables import batches, pieces, read_table
 
 CELLS = (
     *("1", '""', '"a""b"', '"x\ny"', '"x\r\ny"', "", 'c"d', ' "q"', " 2", '"1,5"'),

@@ -18,13 +18,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from fuzzytree import tables
+from fuzzytree.cells import plain
 from fuzzytree.errors import TableError
 from fuzzytree.tables import (
     Table,
     TableSource,
     batches,
     class_names,
-    plain,
     read_table,
 )
 

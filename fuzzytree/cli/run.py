@@ -223,7 +223,7 @@ def _answered(
 
 
 def _kept(batch: Batch, *, as_arrow: bool) -> Columns:
-    from fuzzytree.tables import plain
+    from fuzzytree.cells import plain
 
     piece = batch.piece
     cells: Sequence[Any] = piece.cells

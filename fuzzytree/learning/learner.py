@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from fuzzytree.cells import numbers_only, unmasked
 from fuzzytree.errors import LearningError
 from fuzzytree.learning.assembly import AssembledTree, TermNames, assembled
 from fuzzytree.learning.findings import LearningReport
@@ -20,7 +21,6 @@ from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.learning.validation import ChosenTree, chosen_tree
 from fuzzytree.model import FuzzyTree, text_fault
-from fuzzytree.tables import numbers_only, unmasked
 
 Progress = Callable[[str, float], None]
 
