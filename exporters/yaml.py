@@ -8,8 +8,10 @@ numbers are written so that readers of YAML 1.1 and of YAML 1.2 see the same.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
+
+import msgspec
 
 from fuzzytree import formats
 from fuzzytree.errors import LossError
@@ -56,6 +58,7 @@ from fuzzytree.model import (
     Node,
     PiCurve,
     Points,
+    Probabilities,
     RuleBase,
     RuleBlock,
     Semantics,
@@ -168,6 +171,7 @@ def _rule_base(rules: RuleBase) -> dict[str, Entry]:
         }
         if rule.support is not None:
             whole["support"] = rule.support
+        whole |= _probabilities(rule.probabilities, rules.classes)
         listed.append(whole)
     entries["rules"] = listed
     entries["semantics"] = {
@@ -188,6 +192,7 @@ def _tree(tree: FuzzyTree) -> dict[str, Entry]:
             end["pattern"] = leaf.pattern
         if leaf.support is not None:
             end["support"] = leaf.support
+        end |= _probabilities(leaf.probabilities, tree.classes)
         leaves.append(Short(end))
     entries["leaves"] = leaves
     if tree.sets:
@@ -278,7 +283,22 @@ def _semantics(semantics: Semantics) -> dict[str, Entry]:
     }
     if semantics.label_type:
         entries["label type"] = Noted(semantics.label_type, "of predicted classes")
+    if semantics.sharpness:
+        note = "the power of the strengths that weigh probabilities"
+        entries["sharpness"] = Noted(semantics.sharpness, note)
     return entries
+
+
+def _probabilities(
+    probabilities: Probabilities, classes: Sequence[str]
+) -> dict[str, Entry]:
+    """Return those above the smallest; classes left out share the rest evenly."""
+    if probabilities is msgspec.UNSET:
+        return {}
+    least = min(probabilities)
+    pairs = [*zip(classes, probabilities, strict=True)]
+    listed = {name: one for name, one in pairs if one != least}
+    return {"probabilities": Short({**(listed or dict(pairs))})}
 
 
 def _answer(label: str | None) -> str:

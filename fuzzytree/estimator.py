@@ -13,7 +13,7 @@ from fuzzytree.cells import numbers_only
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import ArrayLearner, LearningReport, LearningSettings
 from fuzzytree.model import FuzzyTree, label_type_of, with_label_type
-from fuzzytree.runtimes import baseline
+from fuzzytree.runtimes import baseline, class_probabilities
 from fuzzytree.semantics import Status, rules_from_tree
 
 try:
@@ -223,32 +223,31 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return self._answers(self._values(X), "tree").rule
 
     def predict_proba(self, X: npt.ArrayLike) -> FloatArray:
-        """Return how strongly the relative rules speak for each class, summing to 1.
+        """Return the probability of each class, as the tree's leaves have it.
 
-        A class has the strength of its strongest rule; the strengths of a row are
-        divided by their sum. They order the classes and say how close a decision is;
-        they are not frequencies. The largest belongs to the class of `predict`.
+        `fuzzytree.model.probabilities` says how they are mixed. The largest belongs to
+        the class of `predict`; every runtime gives the same bits.
 
         Returns:
             Shape (rows, classes), in the order of `classes_`.
 
         Raises:
-            ValueError: As `predict`.
+            ValueError: As `predict`, or if classes and leaves are so many that the
+                tree has no probabilities.
         """
-        outcome = self._answers(self._values(X), "rules")
-        owner = self._class_of_rule()
+        values = self._values(X)
+        if not self.tree_.semantics.sharpness:
+            raise ValueError(
+                f"a tree of {len(self.tree_.leaves)} leaves and {len(self.classes_)} "
+                "classes has no probabilities: there are too many for a model"
+            )
+        outcome = self._answers(values, "rules")
+        rules = rules_from_tree(self.tree_)
         strengths = outcome.strengths
         assert strengths is not None  # the native runtime returns them for a rule base
-        strongest = np.zeros((len(self.classes_), strengths.shape[1]))
-        np.maximum.at(strongest, owner, strengths)
-        shares = strongest / strongest.sum(axis=0)
-        # The winner alone has strength 1; division may round a near one up to it.
-        rows = np.arange(shares.shape[1])
-        winner = owner[outcome.rule - 1]
-        highest = shares[winner, rows]
-        shares = np.minimum(shares, np.nextafter(highest, 0.0))
-        shares[winner, rows] = highest
-        return np.ascontiguousarray(shares.T)
+        mixed = class_probabilities(rules, strengths, outcome.rule)
+        assert mixed is not None  # the tree has a sharpness
+        return np.ascontiguousarray(mixed.T)
 
     def __fuzzytree__(self) -> FuzzyTree:
         """Return the tree, so that every function of fuzzytree takes the classifier.

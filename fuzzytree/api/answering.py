@@ -21,6 +21,7 @@ from fuzzytree.model import (
     Fitted,
     FloatArray,
     FuzzySystem,
+    FuzzyTree,
     Model,
     ModelSource,
     RuleBase,
@@ -40,6 +41,7 @@ from fuzzytree.runtimes import (
     open_onnx,
     predictions_of,
 )
+from fuzzytree.semantics import rules_from_tree
 from fuzzytree.tables import Batch, TableSource, batches, in_order
 
 T = TypeVar("T")
@@ -81,6 +83,7 @@ class RunArguments(TypedDict, total=False):
     runtime: str | None
     columns: Sequence[str] | None
     with_strengths: bool
+    with_probabilities: bool
     allow_loss: bool
 
 
@@ -109,6 +112,7 @@ def run(
     runtime: str | None = None,
     columns: Sequence[str] | None = None,
     with_strengths: bool = True,
+    with_probabilities: bool = False,
     allow_loss: bool = False,
 ) -> Predictions | Outputs:
     """Answer the rows of a table: classes, or the numbers of a fuzzy system.
@@ -127,16 +131,23 @@ def run(
             that the model was learnt from.
         with_strengths: Whether to keep the strengths of the rules, 8 bytes for each
             rule and row.
+        with_probabilities: Whether to return the probability of each class; a tree is
+            then run as its relative rules.
         allow_loss: As in `load`.
 
     Raises:
         TableError: If a column is absent or holds text.
         MissingExtraError: If the runtime is not installed.
         LossError: If the runtime cannot carry the model, or as `load`.
-        ValueError: If there is no such runtime.
+        ValueError: If there is no such runtime, or the model has no probabilities.
     """
     result = opened(model, allow_loss=allow_loss)
-    ready = prepare_answering(result, runtime, with_strengths=with_strengths)
+    ready = prepare_answering(
+        result,
+        runtime,
+        with_strengths=with_strengths,
+        with_probabilities=with_probabilities,
+    )
     source = TableSource(table, columns)
     return joined([*ready(source, lambda _, one: one)])
 
@@ -199,28 +210,51 @@ def prepare_answering(
     runtime: str | None = None,
     *,
     with_strengths: bool = True,
+    with_probabilities: bool = False,
 ) -> Answering:
     """Make a model ready to answer.
+
+    With probabilities a tree is run as its relative rules.
 
     Raises:
         MissingExtraError: If the runtime is not installed.
         LossError: If the runtime cannot carry the model.
-        ValueError: If there is no such runtime, or another one for an ONNX file.
+        ValueError: If there is no such runtime, or another one for an ONNX file, or the
+            model has no probabilities.
     """
+    if with_probabilities:
+        model = _rated(model)
     if isinstance(model, OnnxModel):
         return _answering_onnx(model, runtime, with_strengths=with_strengths)
     if isinstance(model, FuzzySystem):
         return _answering_system(model, runtime, with_strengths=with_strengths)
-    if runtime is None and isinstance(model, RuleBase) and not with_strengths:
+    is_short = not (with_strengths or with_probabilities)
+    if runtime is None and isinstance(model, RuleBase) and is_short:
         runtime = "best-first"  # gives the same classes, rules and statuses
     used = _runtime(runtime or baseline().name, model)
     execute = used.load(model)
 
     def answer(values: FloatArray) -> Predictions:
         outcome = execute(np.ascontiguousarray(values))
-        return predictions_of(outcome, model, with_strengths=with_strengths)
+        return predictions_of(
+            outcome,
+            model,
+            with_strengths=with_strengths,
+            with_probabilities=with_probabilities,
+        )
 
     return Answering(model.inputs, model.columns, answer, used.is_reentrant)
+
+
+def _rated(model: Document | OnnxModel) -> Document | OnnxModel:
+    """Return what computes the probabilities of a model."""
+    if isinstance(model, OnnxModel):
+        if "probabilities" not in model.outputs:
+            raise ValueError(f"{model.name}: the file has no output 'probabilities'")
+        return model
+    if isinstance(model, FuzzySystem) or not model.semantics.sharpness:
+        raise ValueError(f"{model.name} has no probabilities of classes")
+    return rules_from_tree(model) if isinstance(model, FuzzyTree) else model
 
 
 def _answering_system(
@@ -281,6 +315,7 @@ def _answering_onnx(
             status=outcome.status,
             strengths=outcome.strengths if with_strengths else None,
             label_type=model.semantics.label_type,
+            probabilities=outcome.probabilities,
         )
 
     return Answering(model.inputs, model.columns, answer, is_parallel=True)

@@ -72,6 +72,9 @@ class RunOptions:
         "Add a column with the firing strength of each class or rule.",
         choices=["class", "rule"],
     )
+    probabilities: bool = flag(
+        "--probabilities", "Add a column with the probability of each class."
+    )
     why: bool = flag("--why", "Add the winning rule, with its degrees of membership.")
     keep: bool = flag("--keep", "Add the columns of TABLE before the others.")
     runtime: str | None = option(
@@ -125,7 +128,10 @@ def command(options: RunOptions) -> None:
     )
     with wrong_options():
         answer = api.prepare_answering(
-            found, options.runtime, with_strengths=is_weighed
+            found,
+            options.runtime,
+            with_strengths=is_weighed,
+            with_probabilities=options.probabilities,
         )
     source = table_source(options.table, options.delimiter)
     name = "standard input" if options.table == "-" else options.table
@@ -172,7 +178,8 @@ def _part_maker(
     def finish(batch: Batch, answers: Predictions | Outputs) -> RunPart:
         from fuzzytree.runtimes import Predictions
 
-        is_short = not (options.keep or options.strengths or reason)
+        is_more = options.strengths or options.probabilities
+        is_short = not (options.keep or is_more or reason)
         if is_short and not is_binary and isinstance(answers, Predictions):
             columns, text = _few_lines(answers, lines)
             return batch, answers, head(columns), text.encode()

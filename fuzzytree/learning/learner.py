@@ -15,6 +15,7 @@ from fuzzytree.learning.assembly import AssembledTree, TermNames, assembled
 from fuzzytree.learning.findings import LearningReport
 from fuzzytree.learning.growing import GrownTree
 from fuzzytree.learning.patterns import usable_features
+from fuzzytree.learning.probabilities import with_probabilities
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
@@ -170,7 +171,9 @@ class ArrayLearner:
         )
         if progress is not None:
             progress("fitting sets", 1.0)
-        return Learnt(made.tree, self._report(moments, sample, choice, made))
+        places = {name: place for place, name in enumerate(self.columns)}
+        tree = with_probabilities(made.tree, sample, moments.counts, places)
+        return Learnt(tree, self._report(moments, sample, choice, made))
 
     def _report(
         self, moments: Moments, sample: Sample, choice: ChosenTree, made: AssembledTree

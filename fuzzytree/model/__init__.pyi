@@ -110,6 +110,14 @@ from .options import check_names as check_names
 from .options import check_options as check_options
 from .options import option_value as option_value
 from .options import options_of as options_of
+from .probabilities import MOST_MIXED as MOST_MIXED
+from .probabilities import MOST_PROBABILITIES as MOST_PROBABILITIES
+from .probabilities import PARTS as PARTS
+from .probabilities import SHARPNESS as SHARPNESS
+from .probabilities import WEIGHT_OF_ONE as WEIGHT_OF_ONE
+from .probabilities import Probabilities as Probabilities
+from .probabilities import parts_of as parts_of
+from .probabilities import squarings as squarings
 from .rulebase import Conjunction as Conjunction
 from .rulebase import Kind as Kind
 from .rulebase import Label as Label

@@ -164,16 +164,20 @@ class Outcome(msgspec.Struct, frozen=True):
         status: A `fuzzytree.semantics.reference.Status` for each row.
         strengths: Shape (rules, rows), or None where only the path was followed or
             strengths were not requested. NaN in rows with missing values.
+        probabilities: Shape (classes, rows), where the runtime computes them itself
+            and they were requested. NaN in rows without a rule.
     """
 
     rule: IntArray
     status: IntArray
     strengths: FloatArray | None = None
+    probabilities: FloatArray | None = None
 
     def part(self, rows: slice | IntArray) -> Outcome:
         """Return the answers to some of the rows."""
         strengths = None if self.strengths is None else self.strengths[:, rows]
-        return Outcome(self.rule[rows], self.status[rows], strengths)
+        mixed = None if self.probabilities is None else self.probabilities[:, rows]
+        return Outcome(self.rule[rows], self.status[rows], strengths, mixed)
 
 
 Progress = Callable[[str, float], None]

@@ -26,6 +26,11 @@ from fuzzytree.model.mistakes import name_choice as name_choice
 from fuzzytree.model.mistakes import name_mistakes as name_mistakes
 from fuzzytree.model.mistakes import refuse as refuse
 from fuzzytree.model.mistakes import text_fault as text_fault
+from fuzzytree.model.probabilities import (
+    Probabilities,
+    probability_mistakes,
+    sharpness_mistakes,
+)
 from fuzzytree.model.rules import Proposition as Proposition
 from fuzzytree.model.values import Value as Value
 from fuzzytree.model.variables import Part as Part
@@ -61,11 +66,14 @@ class Rule(Value, frozen=True):
         when: The propositions, joined by AND in this order.
         then: The class.
         support: How many training rows reached it, if known.
+        probabilities: Of the classes, in the order of the model's, which
+            `fuzzytree.model.probabilities` mixes; unset in a model without any.
     """
 
     when: tuple[Proposition, ...]
     then: str
     support: int | None = None
+    probabilities: Probabilities = msgspec.UNSET
 
 
 Conjunction = Literal["minimum", "product"]
@@ -89,12 +97,15 @@ class Semantics(Value, frozen=True):
             combination overflows; None answers "no class".
         label_type: What the class names stand for, if not text: a number, such as
             "1" or "0.5", or a boolean, "False" or "True". Predictions have these.
+        sharpness: The power of the strengths that weigh the rules' probabilities, one
+            of 1, 2, 4, ..., 1024; unset in a model without probabilities.
     """
 
     conjunction: Conjunction = "minimum"
     uncovered: str | None = None
     missing: str | None = None
     label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
+    sharpness: int | msgspec.UnsetType = msgspec.UNSET
 
 
 Kind = Literal["relative", "raw"]
@@ -131,6 +142,12 @@ class RuleBase(Value, frozen=True):
             naming_mistakes(self.name, self.classes, self.semantics),
             variable_mistakes(self.variables, self.columns),
             _rule_mistakes(self),
+            probability_mistakes(
+                "rules",
+                [rule.probabilities for rule in self.rules],
+                len(self.classes),
+                self.semantics.sharpness,
+            ),
         )
 
     @property
@@ -240,6 +257,7 @@ def naming_mistakes(
     name: str, classes: tuple[str, ...], semantics: Semantics
 ) -> Iterator[Mistake]:
     """Yield what is wrong with a model's name, classes and default answers."""
+    yield from sharpness_mistakes(semantics.sharpness)
     if not name:
         yield ("name",), "a model needs a name"
     fault = text_fault(name)

@@ -16,6 +16,7 @@ from typing import Literal
 
 import msgspec
 
+from fuzzytree.model.probabilities import Probabilities, probability_mistakes
 from fuzzytree.model.rulebase import (
     Band,
     LabelType,
@@ -48,11 +49,13 @@ class Leaf(Value, frozen=True):
             shapes of the class, such as `hand #2`.
         support: How many training rows reached it, if known; estimated from a sample
             where learning kept one (`rows_per_class`).
+        probabilities: As those of its rule.
     """
 
     label: str
     pattern: str = ""
     support: int | None = None
+    probabilities: Probabilities = msgspec.UNSET
 
 
 class Branch(Value, frozen=True):
@@ -134,6 +137,12 @@ class FuzzyTree(Value, frozen=True):
             _set_mistakes(self),
             _leaf_mistakes(self),
             node_mistakes(self.nodes, self.variables, self.sets),
+            probability_mistakes(
+                "leaves",
+                [leaf.probabilities for leaf in self.leaves],
+                len(self.classes),
+                self.semantics.sharpness,
+            ),
         )
         refuse(_order_mistakes(self), _plateau_mistakes(self))
 

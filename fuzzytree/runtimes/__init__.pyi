@@ -1,5 +1,6 @@
 from .c import COMPILERS as COMPILERS
 from .c import compiled as compiled
+from .mixing import class_probabilities as class_probabilities
 from .native_rules import fire as fire
 from .one_row import load as load
 from .one_row import row_runner as row_runner

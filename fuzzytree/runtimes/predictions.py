@@ -22,6 +22,7 @@ from fuzzytree.model import (
     shapes_of,
     summary,
 )
+from fuzzytree.runtimes.mixing import class_probabilities
 from fuzzytree.semantics import Status, axis_values, evaluate, proposition_degree
 from fuzzytree.tables import pandas_frame
 
@@ -159,6 +160,8 @@ class Predictions(Answers, frozen=True, eq=False):
         rule: The number of the winning rule or leaf of each row, from 1; 0 for none.
         owners: The position in `choices` of each rule's class; empty if not known.
         label_type: What the names of classes stand for, if not text.
+        probabilities: Of each class, shape (classes, rows), NaN in rows without a
+            rule; None if they were not requested.
     """
 
     choices: tuple[str, ...]
@@ -166,6 +169,7 @@ class Predictions(Answers, frozen=True, eq=False):
     rule: IntArray
     owners: tuple[int, ...] = ()
     label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
+    probabilities: FloatArray | None = None
 
     @property
     def classes(self) -> list[Label | None]:
@@ -226,11 +230,18 @@ class Predictions(Answers, frozen=True, eq=False):
         return {"class": labels.take(codes), "rule": pa.array(self.rule, pa.int32())}
 
     def _rows(self, strengths: By | None) -> dict[str, FloatArray]:
+        rows: dict[str, FloatArray] = {}
         values = self.class_strengths if strengths == "class" else None
         if values is None:
-            return super()._rows(strengths)
-        titles = [f"strength of class {name}" for name in self.choices]
-        return dict(zip(titles, values, strict=True))
+            rows = super()._rows(strengths)
+        for what, of_classes in (
+            ("strength", values),
+            ("probability", self.probabilities),
+        ):
+            if of_classes is not None:
+                titles = [f"{what} of class {name}" for name in self.choices]
+                rows |= zip(titles, of_classes, strict=True)
+        return rows
 
     def __repr__(self) -> str:
         """Show how many rows there are; `str` shows how many rows got which class."""
@@ -261,9 +272,16 @@ def joined(parts: Sequence[S]) -> S:
 
 
 def predictions_of(
-    outcome: Outcome, model: Model, *, with_strengths: bool = False
+    outcome: Outcome,
+    model: Model,
+    *,
+    with_strengths: bool = False,
+    with_probabilities: bool = False,
 ) -> Predictions:
-    """Name the classes of an outcome of a model."""
+    """Name the classes of an outcome of a model.
+
+    Probabilities need the strengths of a rule base that has them.
+    """
     if isinstance(model, RuleBase):
         ends = [rule.then for rule in model.rules]
     else:
@@ -277,12 +295,17 @@ def predictions_of(
         (Status.MISSING, semantics.missing),
     ):
         codes[outcome.status == status] = -1 if answer is None else position[answer]
+    probabilities = outcome.probabilities
+    if with_probabilities and isinstance(model, RuleBase) and probabilities is None:
+        assert outcome.strengths is not None  # `prepare_answering` requests them
+        probabilities = class_probabilities(model, outcome.strengths, outcome.rule)
     return Predictions(
         model.classes,
         codes,
         outcome.rule,
         owners,
         semantics.label_type,
+        probabilities,
         status=outcome.status,
         strengths=outcome.strengths if with_strengths else None,
     )

@@ -99,6 +99,8 @@ def rules_from_tree(
             ]
         )
     semantics = tree.semantics
+    if kind == "raw":  # probabilities belong to relative strengths
+        semantics = msgspec.structs.replace(semantics, sharpness=msgspec.UNSET)
     if conjunction:
         semantics = msgspec.structs.replace(semantics, conjunction=conjunction)
     return RuleBase(
@@ -129,7 +131,8 @@ def _rules(tree: FuzzyTree, kind: Kind) -> tuple[Rule, ...]:
         branch, path = todo.pop()
         if branch.leaf is not None:
             leaf = tree.leaves[branch.leaf - 1]
-            rules.append(Rule(path, leaf.label, leaf.support))
+            shares = leaf.probabilities if kind == "relative" else msgspec.UNSET
+            rules.append(Rule(path, leaf.label, leaf.support, shares))
         elif branch.node is not None:
             node = tree.nodes[branch.node - 1]
             for step in reversed(node.branches):

@@ -16,6 +16,7 @@ import msgspec
 
 from fuzzytree.model import (
     LR,
+    WEIGHT_OF_ONE,
     Band,
     FuzzyTree,
     Points,
@@ -24,7 +25,9 @@ from fuzzytree.model import (
     Shape,
     Side,
     Variable,
+    parts_of,
     shapes_of,
+    squarings,
     stand_ins,
 )
 
@@ -105,6 +108,33 @@ def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:
     winner = strengths.index(best)
     status = Status.TIE if strengths.count(best) > 1 else Status.DECIDED
     return Answer(winner + 1, rules.rules[winner].then, status, strengths)
+
+
+def probabilities(rules: RuleBase, answer: Answer) -> tuple[float, ...]:
+    """Return the probability of each class, as `fuzzytree.model.probabilities` says.
+
+    Returns:
+        Numbers in the order of the classes, with the sum 1 but for rounding, of which
+        that of the predicted class is the largest alone; NaN where no rule decided.
+
+    Raises:
+        ValueError: If the rule base has no probabilities.
+    """
+    if rules.semantics.sharpness is msgspec.UNSET:
+        raise ValueError(f"{rules.name!r} has no probabilities")
+    if not answer.rule:
+        return (math.nan,) * len(rules.classes)
+    counts = [0] * len(rules.classes)
+    for rule, value in zip(rules.rules, answer.strengths, strict=True):
+        for _ in range(squarings(rules.semantics.sharpness)):
+            value = value * value
+        weight = math.floor(WEIGHT_OF_ONE * value)
+        for code, part in enumerate(parts_of(rule.probabilities)):
+            counts[code] += weight * part
+    winner = rules.classes.index(rules.rules[answer.rule - 1].then)
+    others = counts[:winner] + counts[winner + 1 :]
+    counts[winner] = max(counts[winner], max(others, default=0) + 1)
+    return tuple(count / sum(counts) for count in counts)
 
 
 def descend(tree: FuzzyTree, row: Mapping[str, float]) -> Answer:

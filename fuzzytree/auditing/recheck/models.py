@@ -160,7 +160,7 @@ class Model:
         keys(
             meaning,
             f"and, uncovered, missing, {', '.join(MEANINGS[kind])}",
-            "label type",
+            "label type, sharpness",
         )
         if meaning["and"] not in ("minimum", "product"):
             raise CannotRunError("its AND is not known")
@@ -193,7 +193,7 @@ class Model:
         self.form, self.nodes = "tree", top.get("nodes", [])
         leaves, count = top["leaves"], 0
         for number, leaf in enumerate(leaves, 1):
-            keys(leaf, "leaf, class", "pattern, support")
+            keys(leaf, "leaf, class", "pattern, support, probabilities")
             count += leaf["leaf"] == number
         for number, node in enumerate(self.nodes, 1):
             keys(node, "node, ask, cuts, branches", "interval owners")
@@ -629,7 +629,7 @@ def _numbers(kind: str, data: Any) -> tuple[str, tuple[Any, ...]]:
 
 
 def _rule(one: Facts) -> Rule:
-    keys(one, "if, then", "support")
+    keys(one, "if, then", "support, probabilities")
     conditions = [read_condition([text]) for text in one["if"]]
     when = [c for c in conditions if isinstance(c, Is) and c.term]
     hedges = {c.hedges for c in when} - {(), ("not",)}

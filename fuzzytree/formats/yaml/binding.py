@@ -131,6 +131,8 @@ def _value(
             return _value(node, what, _chosen(node, kind), mistakes)
         case inspect.StructType():
             return bind(node, _record_type(kind), mistakes)
+        case inspect.DictType():
+            return _numbers_by_name(node, what, kind, mistakes)
         case inspect.VarTupleType():
             return _list(node, what, kind, mistakes)
         case inspect.StrType():
@@ -176,6 +178,24 @@ def _list(
     item = f"an entry of {what}"
     values = [_value(one, item, kind.item_type, mistakes) for one in node.items]
     return None if None in values else tuple(values)
+
+
+def _numbers_by_name(
+    node: Node, what: str, kind: inspect.DictType, mistakes: list[FileMistake]
+) -> dict[str, object] | None:
+    if not isinstance(node, MappingNode):
+        _expected(node, f"{what} must be a mapping", mistakes)
+        return None
+    values: dict[str, object] = {}
+    before = len(mistakes)
+    for key, value in node.pairs:
+        name = _value(key, f"a key of {what}", kind.key_type, mistakes)
+        if isinstance(name, str) and name in values:
+            _add(mistakes, key, f"key {shortened(name)} stands twice")
+        elif isinstance(name, str):
+            text = f"{shortened(name)} of {what}"
+            values[name] = _value(value, text, kind.value_type, mistakes)
+    return values if len(mistakes) == before else None
 
 
 def _text(

@@ -268,6 +268,16 @@ class VariableOfModel(FileRecord, frozen=True, kw_only=True):
     terms: tuple[TermOfVariable, ...] = ()
 
 
+Shares = Annotated[
+    dict[Name, Annotated[float, Meta(ge=0.0, le=1.0)]],
+    Meta(
+        description="the probability of each class, in millionths; classes that are "
+        "left out share the rest evenly",
+        examples=[{"setosa": 0.96, "virginica": 0.03}],
+    ),
+]
+
+
 class RuleOfModel(FileRecord, frozen=True, kw_only=True):
     """If all propositions hold, then the class; support counts training rows."""
 
@@ -275,6 +285,7 @@ class RuleOfModel(FileRecord, frozen=True, kw_only=True):
     if_: Antecedent = field(name="if")
     then: Name
     support: Count | None = None
+    probabilities: Shares | None = None
 
 
 class RuleSemantics(FileRecord, frozen=True, kw_only=True):
@@ -287,6 +298,7 @@ class RuleSemantics(FileRecord, frozen=True, kw_only=True):
     uncovered: Answer
     missing: Answer
     label_type: LabelType | None = field(name="label type", default=None)
+    sharpness: Number | None = None
     answer: Literal["the class of the first of the strongest rules"]
 
 
@@ -298,6 +310,7 @@ class TreeSemantics(FileRecord, frozen=True, kw_only=True):
     uncovered: Answer
     missing: Answer
     label_type: LabelType | None = field(name="label type", default=None)
+    sharpness: Number | None = None
     cuts: Literal["a value equal to a cut lies below it"]
     answer: Literal["the class of the leaf that the nodes lead to"]
 
@@ -334,6 +347,7 @@ class End(FileRecord, frozen=True, kw_only=True):
     class_: Name = field(name="class")
     pattern: Name | None = None
     support: Count | None = None
+    probabilities: Shares | None = None
 
 
 class SetsOfVariable(FileRecord, frozen=True, kw_only=True):

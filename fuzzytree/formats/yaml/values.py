@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import get_args
 
 import msgspec
@@ -20,6 +20,7 @@ from fuzzytree.formats.yaml.conditions import (
 )
 from fuzzytree.model import (
     LR,
+    PARTS,
     Activation,
     And,
     Band,
@@ -35,6 +36,7 @@ from fuzzytree.model import (
     Part,
     Path,
     Points,
+    Probabilities,
     RuleBlock,
     Semantics,
     Sets,
@@ -48,6 +50,8 @@ from fuzzytree.model import (
     Trapezoid,
     Variable,
     combined,
+    name_choice,
+    parts_of,
 )
 
 
@@ -186,6 +190,7 @@ def semantics(value: layout.RuleSemantics | layout.TreeSemantics | None) -> Sema
         _answer(value.uncovered),
         _answer(value.missing),
         value.label_type or msgspec.UNSET,
+        value.sharpness or msgspec.UNSET,
     )
 
 
@@ -248,9 +253,34 @@ def block(head: layout.BlockHead | None, rules: tuple[SystemRule, ...]) -> RuleB
     )
 
 
-def leaf(one: layout.End) -> Leaf:
+def leaf(
+    path: Path, one: layout.End, classes: Sequence[str], mistakes: list[Mistake]
+) -> Leaf:
     """Return a leaf."""
-    return Leaf(one.class_, one.pattern or "", one.support)
+    shares = probabilities(path, one.probabilities, classes, mistakes)
+    return Leaf(one.class_, one.pattern or "", one.support, shares)
+
+
+def probabilities(
+    path: Path,
+    listed: Mapping[str, float] | None,
+    classes: Sequence[str],
+    mistakes: list[Mistake],
+) -> Probabilities:
+    """Return the probability of each class; classes left out share the rest evenly."""
+    if listed is None:
+        return msgspec.UNSET
+    place = (*path, "probabilities")
+    for name in listed:
+        if name not in classes:
+            mistakes.append((place, f"no class {name!r}; {name_choice(name, classes)}"))
+    others = len(classes) - len(listed)
+    rest = PARTS - sum(parts_of(tuple(listed.values())))
+    if others > 0 and rest % others:
+        text = f"{others} classes cannot share {rest / PARTS!r} evenly in millionths"
+        mistakes.append((place, text))
+    share = rest // max(others, 1) / PARTS
+    return tuple(listed.get(name, share) for name in classes)
 
 
 def sets(path: Path, one: layout.SetsOfVariable, mistakes: list[Mistake]) -> Sets:

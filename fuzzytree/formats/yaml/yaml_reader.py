@@ -132,7 +132,7 @@ def _rule_base(root: MappingNode, file_mistakes: list[FileMistake]) -> RuleBase 
     broken: set[Path] = set()
     mistakes: list[Mistake] = []
     variables = _variables(kept, (file_mistakes, mistakes), broken)
-    rules = _rules(bound or [], head.classes[0] if head else "", mistakes)
+    rules = _rules(bound or [], head.classes if head else ("",), mistakes)
     file_mistakes += located(root, mistakes)
     if head is None or bound is None or variables is None:
         return None
@@ -151,14 +151,16 @@ def _rule_base(root: MappingNode, file_mistakes: list[FileMistake]) -> RuleBase 
 
 
 def _rules(
-    bound: list[layout.RuleOfModel | None], any_class: str, mistakes: list[Mistake]
+    bound: list[layout.RuleOfModel | None],
+    classes: Sequence[str],
+    mistakes: list[Mistake],
 ) -> tuple[Rule, ...]:
     """Return the rules, with one that is always right in the place of a broken one."""
     known: dict[str, Condition | None] = {}
     rules: list[Rule] = []
     for position, one in enumerate(bound):
         if one is None:
-            rules.append(Rule((), any_class))
+            rules.append(Rule((), classes[0]))
             continue
         path: Path = ("rules", position)
         when = values.conditions(path, one.if_, known, mistakes)
@@ -169,7 +171,8 @@ def _rules(
                 "TERM or TERM', or the same with 'is not'"
             )
             mistakes.append(((*path, "when"), f"rule {position + 1}: {text}"))
-        rules.append(Rule(propositions, one.then, one.support))
+        shares = values.probabilities(path, one.probabilities, classes, mistakes)
+        rules.append(Rule(propositions, one.then, one.support, shares))
     return tuple(rules)
 
 
@@ -185,17 +188,22 @@ def _tree(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzyTree | No
     variables = _variables(kept, (file_mistakes, wrong), broken)
     if questions is not None and ends is not None:
         wrong += _number_mistakes(questions, ends)
-    nodes, leaves, fitted = _whole(questions), _whole(ends), _whole(groups)
+    nodes, kept_ends, fitted = _whole(questions), _whole(ends), _whole(groups)
     tree_nodes = tuple(map(values.node, nodes or ()))
     sets = tuple(
         values.sets(("sets", place), one, wrong)
         for place, one in enumerate(fitted or ())
     )
+    ends_of = head.classes if head else ()
+    leaves = tuple(
+        values.leaf(("leaves", place), one, ends_of, wrong)
+        for place, one in enumerate(kept_ends or ())
+    )
     file_mistakes += located(root, wrong)
     if head is None or variables is None:
         return None
     meaning = values.semantics(semantics)
-    if nodes is None or leaves is None or fitted is None or broken:
+    if nodes is None or kept_ends is None or fitted is None or broken:
         of_nodes = node_mistakes(
             tree_nodes, variables, None if fitted is None else sets
         )
@@ -212,7 +220,7 @@ def _tree(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzyTree | No
             classes=head.classes,
             variables=variables,
             nodes=tree_nodes,
-            leaves=tuple(map(values.leaf, leaves)),
+            leaves=leaves,
             sets=sets,
             semantics=meaning,
             columns=head.columns,

@@ -25,6 +25,7 @@ from fuzzytree.model import (
     Not,
     Or,
     Part,
+    Probabilities,
     Proposition,
     Rule,
     RuleBase,
@@ -75,6 +76,7 @@ class _Facts(Value, frozen=True):
     variables: tuple[_Named, ...]
     propositions: tuple[tuple[int, tuple[int, ...], bool], ...]
     rules: tuple[tuple[tuple[int, ...], int, int | None], ...]
+    probabilities: tuple[Probabilities, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 def facts_of(
@@ -128,6 +130,9 @@ def facts_of(
             (tuple(number[c] for c in rule.when), labels[rule.then], rule.support)
             for rule in rules.rules
         ),
+        probabilities=tuple(rule.probabilities for rule in rules.rules)
+        if rules.semantics.sharpness
+        else msgspec.UNSET,
     )
     text = json.dumps(msgspec.to_builtins(facts), separators=(",", ":"))
     for character, escape in _UNSAFE.items():
@@ -315,9 +320,15 @@ def _rules(facts: _Facts, curves: Mapping[int, Sequence[Term]]) -> RuleBase:
         )
         for place, terms, negated in facts.propositions
     ]
+    vectors = facts.probabilities or (msgspec.UNSET,) * len(facts.rules)
     rules = tuple(
-        Rule(tuple(propositions[k] for k in places), facts.classes[label], support)
-        for places, label, support in facts.rules
+        Rule(
+            tuple(propositions[k] for k in places),
+            facts.classes[label],
+            support,
+            shares,
+        )
+        for (places, label, support), shares in zip(facts.rules, vectors, strict=True)
     )
     return RuleBase(
         facts.name,

@@ -1,0 +1,59 @@
+"""The probabilities of classes, mixed from strengths of rules in numpy.
+
+`fuzzytree.model.probabilities` defines them. All counts are whole numbers that a double
+holds, so a matrix product gives the same bits in any order of its sums.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.model import WEIGHT_OF_ONE, RuleBase, parts_of, squarings
+
+if TYPE_CHECKING:
+    from fuzzytree.model import FloatArray, IntArray
+
+_CHUNK = 1 << 14  # rows
+
+
+def class_probabilities(
+    rules: RuleBase, strengths: FloatArray, winner: IntArray
+) -> FloatArray | None:
+    """Return the probability of each class for each row.
+
+    Args:
+        rules: The rule base.
+        strengths: Of each rule, shape (rules, rows).
+        winner: The number of the winning rule of each row, from 1; 0 for none.
+
+    Returns:
+        Shape (classes, rows), NaN in rows without a rule; None if the rule base has
+        no probabilities.
+    """
+    if rules.semantics.sharpness is msgspec.UNSET:
+        return None
+    parts = np.array([parts_of(r.probabilities) for r in rules.rules], np.float64).T
+    codes = {name: code for code, name in enumerate(rules.classes)}
+    owners = np.array([0, *(codes[rule.then] for rule in rules.rules)], np.int64)
+    result = np.full((len(rules.classes), strengths.shape[1]), np.nan)
+    for start in range(0, len(winner), _CHUNK):
+        rows = start + np.flatnonzero(winner[start : start + _CHUNK])
+        weights = weights_of(strengths[:, rows], rules.semantics.sharpness)
+        counts = parts @ weights
+        place = owners[winner[rows]], np.arange(len(rows))
+        mine = counts[place]
+        counts[place] = -1.0
+        counts[place] = np.maximum(mine, counts.max(axis=0, initial=0.0) + 1.0)
+        result[:, rows] = counts / counts.sum(axis=0)
+    return result
+
+
+def weights_of(strengths: FloatArray, sharpness: int) -> FloatArray:
+    """Return the weights of rules, whole numbers, given their strengths."""
+    powers = strengths
+    for _ in range(squarings(sharpness)):
+        powers = powers * powers
+    return np.floor(WEIGHT_OF_ONE * powers)
