@@ -78,7 +78,7 @@ def _block(entries: Entries, indent: int) -> Iterator[str]:
     pad = " " * indent
     if isinstance(entries, dict):
         for key, entry in entries.items():
-            yield from _pair(f"{pad}{key}:", entry, indent)
+            yield from _pair(f"{pad}{_text(key)}:", entry, indent)
         return
     for entry in entries:
         if isinstance(entry, Short):
@@ -150,8 +150,8 @@ def _flow(entry: Entry) -> str:
         case Short():
             return _flow(entry.entries)
         case dict():
-            pairs = ", ".join(f"{key}: {_flow(one)}" for key, one in entry.items())
-            return f"{{{pairs}}}"
+            pairs = [f"{_text(key)}: {_flow(one)}" for key, one in entry.items()]
+            return f"{{{', '.join(pairs)}}}"
         case list():
             return f"[{', '.join(map(_flow, entry))}]"
         case _:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import itertools
 import random
 from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 from msgspec.structs import replace
 
@@ -22,6 +23,8 @@ from fuzzytree.errors import DisagreementError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import (
     LR,
+    PARTS,
+    SHARPNESS,
     Band,
     Branch,
     Conclusion,
@@ -61,6 +64,8 @@ from fuzzytree.semantics import (
     rules_from_tree,
 )
 
+Rated = TypeVar("Rated", FuzzyTree, RuleBase)
+
 __all__ = [
     "SPECIAL",
     "check_exporter",
@@ -70,6 +75,7 @@ __all__ = [
     "random_rows",
     "random_system",
     "random_tree",
+    "rated",
     "with_points",
 ]
 
@@ -289,6 +295,31 @@ def random_tree(
     return _assemble(
         chance, columns, labels, derived, tests, plan, semantics or Semantics()
     )
+
+
+def rated(model: Rated, seed: int) -> Rated:
+    """Return a tree or rule base with random probabilities at its leaves or rules.
+
+    Example:
+        >>> rated(random_tree(1), 0).semantics.sharpness
+        512
+    """
+    chance = random.Random(seed)
+    vectors: list[tuple[float, ...]] = []
+    ends = model.leaves if isinstance(model, FuzzyTree) else model.rules
+    for _ in ends:
+        count = len(model.classes) - 1
+        marks: list[int] = sorted(chance.choices(range(PARTS + 1), k=count))
+        steps = itertools.pairwise([0, *marks, PARTS])
+        vectors.append(tuple((high - low) / PARTS for low, high in steps))
+    semantics = replace(model.semantics, sharpness=chance.choice(SHARPNESS))
+    if isinstance(model, FuzzyTree):
+        leaves = zip(model.leaves, vectors, strict=True)
+        new_leaves = tuple(replace(one, probabilities=v) for one, v in leaves)
+        return replace(model, leaves=new_leaves, semantics=semantics)
+    rules = zip(model.rules, vectors, strict=True)
+    new_rules = tuple(replace(one, probabilities=v) for one, v in rules)
+    return replace(model, rules=new_rules, semantics=semantics)
 
 
 def with_points(rules: RuleBase, seed: int, *, share: float = 0.6) -> RuleBase:

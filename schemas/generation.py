@@ -176,6 +176,14 @@ def _schema(kind: inspect.Type, definitions: Definitions) -> Definitions:
             if issubclass(kind.cls, FileRecord):
                 _define(kind.cls, definitions)
             return {"$ref": f"#/$defs/{kind.cls.__name__}"}
+        case inspect.DictType():
+            names = _schema(kind.key_type, definitions)
+            numbers = _schema(kind.value_type, definitions)
+            return {
+                "type": "object",
+                "propertyNames": names,
+                "additionalProperties": numbers,
+            }
         case inspect.VarTupleType():
             item = _schema(kind.item_type, definitions)
             sizes = {"minItems": kind.min_length, "maxItems": kind.max_length}

@@ -27,7 +27,7 @@ from fuzzytree.estimator import FuzzyTreeClassifier, Mode
 from fuzzytree.model.rulebase import Band, Part, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.reference import descend, evaluate
+from fuzzytree.semantics.reference import descend, evaluate, probabilities
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray, IntArray
@@ -50,20 +50,22 @@ def test_predict_descends_the_tree() -> None:
     assert model.apply(WINE.data).tolist() == [answer.rule for answer in answers]
 
 
-def test_the_probabilities_are_the_strengths_of_the_strongest_rules() -> None:
+def test_the_probabilities_are_those_of_the_reference() -> None:
     model = FuzzyTreeClassifier().fit(IRIS, SPECIES)
     rules = rules_from_tree(model.tree_)
     found = model.predict_proba(IRIS[50:60])
     for row, shares in zip(IRIS[50:60], found, strict=True):
-        strengths = evaluate(
-            rules, dict(zip(["x1", "x2", "x3", "x4"], row, strict=True))
-        ).strengths
-        strongest = [
-            max(s for s, r in zip(strengths, rules.rules, strict=True) if r.then == c)
-            for c in rules.classes
-        ]
-        expected = np.array(strongest) / sum(strongest)
-        assert np.abs(shares - expected).max() <= 2e-16
+        answer = evaluate(rules, dict(zip(["x1", "x2", "x3", "x4"], row, strict=True)))
+        assert tuple(shares) == probabilities(rules, answer)
+
+
+def test_the_probabilities_are_better_than_the_frequencies_of_the_classes() -> None:
+    halves = np.arange(len(IRIS)) % 2 == 0
+    model = FuzzyTreeClassifier().fit(IRIS[halves], SPECIES[halves])
+    shares = model.predict_proba(IRIS[~halves])
+    own = shares[np.arange(len(shares)), SPECIES[~halves]]
+    assert np.abs(shares.sum(axis=1) - 1.0).max() <= 1e-15
+    assert -np.log(own).mean() < 0.25  # of even frequencies log(3), about 1.1
 
 
 def test_the_largest_probability_belongs_to_the_prediction_on_every_edge() -> None:

@@ -249,7 +249,8 @@ def prepare_answering(
 def _rated(model: Document | OnnxModel) -> Document | OnnxModel:
     """Return what computes the probabilities of a model."""
     if isinstance(model, OnnxModel):
-        if "probabilities" not in model.outputs:
+        outputs: tuple[str, ...] = model.outputs
+        if "probabilities" not in outputs:
             raise ValueError(f"{model.name}: the file has no output 'probabilities'")
         return model
     if isinstance(model, FuzzySystem) or not model.semantics.sharpness:

@@ -185,28 +185,27 @@ def _fitted(rows: _Rows, sharpness: int) -> tuple[FloatArray, float]:
         powers = powers * powers
     powers = np.floor(WEIGHT_OF_ONE * powers)
     shares = np.where(rows.strengths == 1.0, rows.weights, 0.0)
-    even = _EVEN_ROWS / rows.classes
-    vectors, likely = np.empty(0), np.empty(0)
-    for _ in range(1 + _STEPS):
-        counts = _by_class(shares, rows)
-        totals = counts.sum(axis=1, keepdims=True) + _EVEN_ROWS
-        vectors = (counts + even) / totals
-        likely = counts[:, rows.codes]
-        last = shares
-        shares = powers * vectors[:, rows.codes]
+    for _ in range(_STEPS):
+        shares = powers * _vectors(shares, rows)[0][:, rows.codes]
         shares *= rows.weights / shares.sum(axis=0)
-    left_out = (likely - last + even) / (totals - last)
+    vectors, totals = _vectors(shares, rows)
+    likely = vectors[:, rows.codes] * totals
+    left_out = (likely - shares) / (totals - shares)
     chances = (powers * left_out).sum(axis=0) / powers.sum(axis=0)
     loss = -(rows.weights * np.log(chances)).sum() / rows.weights.sum()
     return vectors, float(loss)
 
 
-def _by_class(shares: FloatArray, rows: _Rows) -> FloatArray:
-    """Return the sum of the shares of each leaf over the rows of each class."""
+def _vectors(shares: FloatArray, rows: _Rows) -> tuple[FloatArray, FloatArray]:
+    """Return the vectors of the leaves, and how many rows each leaf has.
+
+    The share of a row in a leaf counts for the row's class.
+    """
     present, starts = np.unique(rows.codes, return_index=True)
-    counts = np.zeros((len(shares), rows.classes))
-    counts[:, present] = np.add.reduceat(shares, starts, axis=1)
-    return counts
+    counts = np.full((len(shares), rows.classes), _EVEN_ROWS / rows.classes)
+    counts[:, present] += np.add.reduceat(shares, starts, axis=1)
+    totals = counts.sum(axis=1, keepdims=True)
+    return counts / totals, totals
 
 
 def _in_parts(vectors: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ largest of the others plus 1. The probability of c is `n[c] / sum(n)`, rounded o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import msgspec
 
@@ -94,7 +94,7 @@ def probability_mistakes(
             yield path, f"{noun} {number}: {fault}"
 
 
-def _faults(vector: Probabilities, classes: int, *, wanted: bool) -> Iterable[str]:
+def _faults(vector: Probabilities, classes: int, *, wanted: bool) -> Iterator[str]:
     """Yield what is wrong with the probabilities of one rule."""
     if vector is msgspec.UNSET:
         if wanted:
