@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
-from fuzzytree.exporters.c_rules import rules_code
+from fuzzytree.exporters.c_rules import probability_code, rules_code
 from fuzzytree.exporters.c_selftest import number_of, selftest_code
 from fuzzytree.exporters.c_steps import (
     SYSTEM_TYPES,
@@ -34,7 +34,7 @@ from fuzzytree.exporters.c_text import (
     whole_lines,
     whole_table,
 )
-from fuzzytree.exporters.program_text import title_of
+from fuzzytree.exporters.program_text import check_rated, title_of
 from fuzzytree.model import (
     Document,
     Format,
@@ -122,6 +122,13 @@ typedef struct {
 name_answer name_decide(const name_real *x);
 """
 
+_PROBABILITIES_TYPE = """
+/* Fill in NAME_CLASSES probabilities, given an answer of name_strengths and what it
+ * filled in; they are no numbers where no rule decides. */
+void name_probabilities(
+    name_answer found, const name_real *strengths, double *probabilities);
+"""
+
 _STRENGTHS_TYPE = """
 /* Fire every rule, fill in NAME_RULES strengths (no numbers if a value is missing), and
  * return the answer, which is that of name_decide. */
@@ -137,6 +144,7 @@ def write_c(
     dtype: Literal["float64", "float32"] = "float64",
     name: str | None = None,
     activations: bool = False,
+    probabilities: bool = False,
 ) -> Written:
     """Return a model as the text of a C file, in ASCII.
 
@@ -151,6 +159,8 @@ def write_c(
         name: The beginning of all names in the file; that of the model unless given.
         activations: Of a fuzzy system: whether the degree of activation of every rule
             stands behind the outputs.
+        probabilities: Of a rule base that has them: whether the file also offers
+            `NAME_probabilities(answer, strengths, probabilities)`.
 
     Raises:
         LossError: If float32 cannot represent a number of the model, unless allowed.
@@ -164,6 +174,8 @@ def write_c(
     """
     if dtype not in _NUMBERS:
         raise ValueError(f"C has float64 and float32, not {dtype!r}")
+    if probabilities:
+        check_rated(model, "c")
     prefix = beginning(model.name, name)
     if isinstance(model, FuzzySystem):
         if dtype != "float64":
@@ -176,7 +188,7 @@ def write_c(
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, "c float32", lost)
-    code = CFile(model, _NUMBERS[dtype], prefix)
+    code = CFile(model, _NUMBERS[dtype], prefix, probabilities=probabilities)
     return Written("".join(code.text()).encode("ascii"), lost)
 
 
@@ -226,9 +238,17 @@ def _checks(numbers: CNumbers, *, is_arithmetic: bool) -> str:
 class CFile(CModel):
     """A file in the making."""
 
-    def __init__(self, model: Model, numbers: CNumbers, prefix: str) -> None:
+    def __init__(
+        self,
+        model: Model,
+        numbers: CNumbers,
+        prefix: str,
+        *,
+        probabilities: bool = False,
+    ) -> None:
         super().__init__(model, numbers)
         self.prefix = prefix
+        self.probabilities = probabilities
 
     def text(self) -> Iterator[str]:
         """Yield the file."""
@@ -266,6 +286,8 @@ class CFile(CModel):
             yield from rules_code(
                 self.tables, self.numbers, axes, is_product=is_product
             )
+        if self.probabilities and isinstance(model, RuleBase):
+            yield from probability_code(model)
 
     def _fill(self, template: str) -> str:
         return fill(template, self.prefix)
@@ -290,6 +312,7 @@ class CFile(CModel):
         yield "\n};\n"
         yield self._fill(_TYPES).replace("RULE,", "rule," if rules else "leaf,")
         yield self._fill(_STRENGTHS_TYPE) if rules else ""
+        yield self._fill(_PROBABILITIES_TYPE) if self.probabilities else ""
         yield "\n#ifdef __cplusplus\n}\n#endif\n"
 
 

@@ -21,8 +21,10 @@ from fuzzytree.exporters.c_text import (
     CNumbers,
     place_type,
     real_table,
+    whole_lines,
     whole_table,
 )
+from fuzzytree.model import WEIGHT_OF_ONE, RuleBase, parts_of, squarings
 
 _MANY_RULES = 16  # from which a first guess at the winner pays
 _MOST_KEPT = 512  # propositions whose degrees are kept while rules are evaluated
@@ -32,6 +34,35 @@ static name_real name_held(name_real value, name_real low, name_real high)
 {
     value = value > low ? value : low;
     return value < high ? value : high;
+}
+"""
+
+_PROBABILITIES = """
+void name_probabilities(
+    name_answer found, const name_real *strengths, double *probabilities)
+{
+    double total = 0, largest = 0;
+    unsigned place, rule;
+    for (place = 0; place < NAME_CLASSES; place++)
+        probabilities[place] = found.rule == 0 ? (double)name_no_number() : 0;
+    if (found.rule == 0)
+        return;
+    for (rule = 0; rule < NAME_RULES; rule++) { /* whole numbers: all sums are exact */
+        double weight = (double)strengths[rule];
+        const uint32_t *part = name_millionths + rule * NAME_CLASSES;
+SQUARE        weight = (double)(uint32_t)(WEIGHT * weight);
+        for (place = 0; place < NAME_CLASSES; place++)
+            probabilities[place] += weight * part[place];
+    }
+    for (place = 0; place < NAME_CLASSES; place++)
+        if ((int)place != found.label && probabilities[place] > largest)
+            largest = probabilities[place];
+    if (!(probabilities[found.label] > largest))
+        probabilities[found.label] = largest + 1;
+    for (place = 0; place < NAME_CLASSES; place++)
+        total += probabilities[place];
+    for (place = 0; place < NAME_CLASSES; place++)
+        probabilities[place] /= total;
 }
 """
 
@@ -287,6 +318,21 @@ def rules_code(
     for template in _functions(tables, numbers):
         text = template.replace("JOIN", "a * b" if is_product else "b < a ? b : a")
         yield text.replace("TAKE_AXES\n", axes).replace("AT ", f"{kind} ")
+
+
+def probability_code(rules: RuleBase) -> Iterator[str]:
+    """Yield the probabilities of all rules in millionths, and what mixes them."""
+    parts = [part for rule in rules.rules for part in parts_of(rule.probabilities)]
+    about = "The probabilities of the classes, rule by rule, in millionths."
+    yield f"/* {about} */\n"
+    yield f"static const uint32_t name_millionths[{len(parts)}] = {{\n"
+    yield from whole_lines(parts)
+    yield "};\n"
+    square = "        weight = weight * weight;\n" * squarings(
+        rules.semantics.sharpness
+    )
+    text = _PROBABILITIES.replace("SQUARE", square)
+    yield text.replace("WEIGHT", f"{WEIGHT_OF_ONE}")
 
 
 def _data(tables: Tables, numbers: CNumbers) -> Iterator[str]:

@@ -32,6 +32,7 @@ from fuzzytree.exporters.js_text import (
 )
 from fuzzytree.exporters.program_text import (
     answer_of,
+    check_rated,
     node_rows,
     places_of,
     system_examples,
@@ -57,6 +58,7 @@ from fuzzytree.semantics import (
     from_axes,
     from_rules,
     from_system,
+    row_probabilities,
     system_probes,
 )
 
@@ -73,6 +75,7 @@ def write(
     *,
     allow_loss: bool = False,
     module: Literal["es", "script"] = "es",
+    probabilities: bool = False,
 ) -> Written:
     """Return a model as the text of a JavaScript file, in ASCII.
 
@@ -88,6 +91,11 @@ def write(
         allow_loss: Of no effect: nothing is lost.
         module: As an ES module (`es`), or (`script`) for a plain script element, where
             it becomes `fuzzytree[name of the model]`, and for `require`.
+        probabilities: Whether `answer` of a rule base also returns `probabilities`, of
+            the classes in order; the rule base must have them.
+
+    Raises:
+        ValueError: If probabilities are wanted that the model does not have.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -95,7 +103,9 @@ def write(
         /* A fuzzy tree, named "random 7". Written by fuzzytree. */
     """
     del allow_loss
-    body = "".join(_body(model))
+    if probabilities:
+        check_rated(model, "javascript")
+    body = "".join(_body(model, probabilities=probabilities))
     ending = AS_MODULE if module == "es" else AS_SCRIPT
     ending = filled(ending, doors=", ".join(_doors(model)), name=text_of(model.name))
     if module == "script":
@@ -118,7 +128,7 @@ def _doors(model: Document) -> tuple[str, ...]:
             return ("INPUTS", "OUTPUTS", "infer", "answer", "selfTest")
 
 
-def _body(model: Document) -> Iterator[str]:
+def _body(model: Document, *, probabilities: bool) -> Iterator[str]:
     yield START
     inputs = (_entry_of(one) for one in model.variables if not one.parts)
     yield from table("INPUTS", inputs)
@@ -131,11 +141,20 @@ def _body(model: Document) -> Iterator[str]:
         case RuleBase():
             yield from _classes(model)
             comments = [*_DECISION[:3], *map(sentence, model.rules)]
-            yield from _numbers(from_rules(model), _DECISION, comments)
+            kinds, shown = _DECISION, ", strengths"
             what = "class, rule number, status and strengths"
-            yield filled(DECIDE, what=what, strengths=", strengths")
+            if probabilities:
+                kinds = (*_DECISION, "probability")
+                comments += [f"probability of {name}" for name in model.classes]
+                what += ", and probabilities"
+                count = len(model.rules)
+                shown = f", strengths: strengths.slice(0, {count})"
+                shown += f", probabilities: strengths.slice({count})"
+            program = from_rules(model, probabilities=probabilities)
+            yield from _numbers(program, kinds, comments)
+            yield filled(DECIDE, what=what, strengths=shown)
             yield STRENGTHS
-            examples = _examples(model)
+            examples = _examples(model, probabilities=probabilities)
         case FuzzySystem():
             yield from table("OUTPUTS", map(_entry_of, model.outputs))
             yield from _numbers(from_system(model, activations=True), _INFERENCE)
@@ -206,7 +225,7 @@ def _numbers(
     yield from steps.helpers()
 
 
-def _examples(model: Model) -> Iterator[str]:
+def _examples(model: Model, *, probabilities: bool = False) -> Iterator[str]:
     """Yield rows and the predictions of the reference."""
     rules = len(model.rules) if isinstance(model, RuleBase) else 1
     most = min(_MOST_EXAMPLES, _STRENGTHS // rules)
@@ -215,6 +234,8 @@ def _examples(model: Model) -> Iterator[str]:
         one = answer_of(model, row)
         place = -1 if one.label is None else model.classes.index(one.label)
         expected = [place, one.rule, int(one.status), *one.strengths]
+        if probabilities and isinstance(model, RuleBase):
+            expected += row_probabilities(model, one)
         yield f"{literal([values, expected, []])},"
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import msgspec
 
 from fuzzytree.errors import MissingExtraError, install_hint
+from fuzzytree.exporters.program_text import check_rated
 from fuzzytree.model import (
     Dtype,
     Format,
@@ -37,7 +38,9 @@ if TYPE_CHECKING:
 FORMAT_VERSION = "1"
 """Of the meaning of inputs, outputs and metadata."""
 
-Output = Literal["label", "rule", "strengths", "status", "outputs", "activations"]
+Output = Literal[
+    "label", "rule", "strengths", "status", "probabilities", "outputs", "activations"
+]
 Signature = Literal["needed", "all"]
 
 OPSETS = range(12, 27)
@@ -57,7 +60,9 @@ OLDEST: Mapping[str, str] = {
 within their bounds; 1.15 is the oldest there is for Python 3.11, and `TreeEnsemble`
 came with 1.21."""
 
-_OF_MODELS: tuple[Output, ...] = ("label", "rule", "strengths", "status")
+_OF_MODELS: tuple[Output, ...] = (
+    *("label", "rule", "strengths", "status", "probabilities"),
+)
 _OF_SYSTEMS: tuple[Output, ...] = ("outputs", "status", "activations")
 
 
@@ -81,7 +86,10 @@ def write_onnx(
     The outputs, each with one entry per row: `label`, the class or "" for none;
     `rule`, the number of the winning rule or leaf from 1, or 0; `status`, a
     `fuzzytree.semantics.reference.Status`; `strengths`, of shape (rows, rules), NaN
-    where a value is missing. Of a fuzzy system: `outputs`, of shape (rows, outputs),
+    where a value is missing; `probabilities`, of shape (rows, classes), double, NaN
+    where no rule decides, of a rule base that has them.
+
+    Of a fuzzy system: `outputs`, of shape (rows, outputs),
     NaN without a number; `status`; `activations`, of shape (rows, rules). The same
     model and options give the same bytes.
 
@@ -202,6 +210,8 @@ def check_outputs(
         raise ValueError(
             "outputs: a tree has no strengths; write its rules to have them"
         )
+    if "probabilities" in outputs:
+        check_rated(model, "outputs")
 
 
 def check_versions(opset: int, ir: int) -> None:
@@ -255,6 +265,8 @@ def _model_proto(
         "strengths": (degree, ["rows", rules]),
         "activations": (degree, ["rows", rules]),
     }
+    if "probabilities" in outputs and not isinstance(model, FuzzySystem):
+        kinds["probabilities"] = TensorProto.DOUBLE, ["rows", len(model.classes)]
     facts = _facts(model, dtype, columns, outputs)
     if isinstance(model, FuzzySystem):
         from fuzzytree.exporters.onnx_steps import program_graph, rows_at_once
@@ -299,7 +311,8 @@ def _fill(
     elif readable:
         from fuzzytree.exporters.onnx_steps import program_graph
 
-        program_graph(graph, from_rules(model), columns, outputs, model.classes)
+        program = from_rules(model, probabilities="probabilities" in outputs)
+        program_graph(graph, program, columns, outputs, model.classes)
     else:
         from fuzzytree.exporters.onnx_rules import rules_graph
 

@@ -12,8 +12,17 @@ import msgspec
 import numpy as np
 from onnx import numpy_helper
 
-from fuzzytree.exporters.onnx_graph import OnnxGraph
-from fuzzytree.model import FuzzyTree, Model, Part, RuleBase, Variable
+from fuzzytree.exporters.onnx_graph import OnnxGraph, np_to_onnx
+from fuzzytree.model import (
+    WEIGHT_OF_ONE,
+    FuzzyTree,
+    Model,
+    Part,
+    RuleBase,
+    Variable,
+    parts_of,
+    squarings,
+)
 from fuzzytree.numerics import RealKind, rounded
 from fuzzytree.semantics import Status
 
@@ -198,6 +207,9 @@ def add_rule_outputs(
         _add_label(graph, rules, frame, winner)
     if "status" in outputs:
         _add_status(graph, frame, strengths, winner)
+    if "probabilities" in outputs:
+        with graph.about("probabilities"):
+            _add_probabilities(graph, rules, strengths, winner)
     if "strengths" in outputs:
         ends = [graph.numbers([end], "end") for end in (1, 1 + len(rules.rules))]
         with graph.about("strengths"):
@@ -205,6 +217,40 @@ def add_rule_outputs(
             unknown = graph.number(np.nan, graph.types.degree)
             real = graph.node("Where", is_known(graph, frame), real, unknown)
         graph.node("Transpose", real, perm=[1, 0], named="strengths")
+
+
+def _add_probabilities(
+    graph: OnnxGraph, rules: RuleBase, strengths: str, winner: str
+) -> None:
+    """Mix the probabilities of all rules: whole numbers, so that sums are exact."""
+    end = graph.numbers([1 + len(rules.rules)], "end")
+    start, line = graph.numbers([1], "start"), graph.numbers([0], "axes")
+    power = graph.node("Slice", strengths, start, end, line)
+    if graph.types.degree is not np.float64:
+        power = graph.node("Cast", power, to=np_to_onnx(np.float64))
+    for _ in range(squarings(rules.semantics.sharpness)):
+        power = graph.node("Mul", power, power)
+    one, zero = _double(graph, float(WEIGHT_OF_ONE)), _double(graph, 0.0)
+    weights = graph.node("Floor", graph.node("Mul", power, one), hint="weights")
+    parts = [parts_of(rule.probabilities) for rule in rules.rules]
+    table = graph.constant(np.array(parts, np.float64).T.copy(), "parts")
+    counts = graph.node("MatMul", table, weights, hint="counts")
+    codes = [0, *(rules.classes.index(rule.then) for rule in rules.rules)]
+    own = graph.node("Gather", graph.numbers(codes, "classes"), winner, axis=0)
+    every = graph.constant(np.arange(len(rules.classes)).reshape(-1, 1), "classes")
+    is_own = graph.node("Equal", every, own, hint="is_own")
+    others = graph.node("Where", is_own, zero, counts)
+    least = graph.node("Add", graph.highest(others, axis=0), _double(graph, 1.0))
+    raised = graph.node("Max", counts, least)
+    counts = graph.node("Where", is_own, raised, counts, hint="counts")
+    shares = graph.node("Div", counts, graph.total(counts, axis=0, keepdims=1))
+    is_none = graph.node("Equal", winner, graph.whole(0))
+    shares = graph.node("Where", is_none, _double(graph, np.nan), shares)
+    graph.node("Transpose", shares, perm=[1, 0], named="probabilities")
+
+
+def _double(graph: OnnxGraph, value: float) -> str:
+    return graph.number(value, np.float64)
 
 
 def add_winner(graph: OnnxGraph, strengths: str, named: str = "rule") -> str:

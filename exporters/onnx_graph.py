@@ -27,7 +27,7 @@ _LONGEST_NAME = 60
 
 _ENDS = (
     *("inputs", "frames", "outputs", "activations", "label", "rule", "winner"),
-    *("status", "strengths", "state", "features"),
+    *("status", "strengths", "probabilities", "state", "features"),
 )
 """Names that only a graph's own inputs and outputs bear."""
 
@@ -268,6 +268,12 @@ class OnnxGraph:
             axes = self.numbers([axis], "axes")
             return self.node("ReduceSum", source, axes, keepdims=keepdims)
         return self.node("ReduceSum", source, axes=[axis], keepdims=keepdims)
+
+    def highest(self, source: str, *, axis: int) -> str:
+        """Return the largest number along an axis, which stays with the length 1."""
+        if self.opset >= 18:
+            return self.node("ReduceMax", source, self.numbers([axis], "axes"))
+        return self.node("ReduceMax", source, axes=[axis])
 
     def used(self) -> list[onnx.TensorProto]:
         """Return the constants that a node takes; `_turned` leaves some behind."""

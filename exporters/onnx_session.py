@@ -14,7 +14,13 @@ from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.exporters.program_text import answer_of, system_examples
 from fuzzytree.model import Document, FuzzySystem, RuleBase
 from fuzzytree.numerics import RealKind
-from fuzzytree.semantics import Row, few_probes, from_system, system_probes
+from fuzzytree.semantics import (
+    Row,
+    few_probes,
+    from_system,
+    row_probabilities,
+    system_probes,
+)
 
 _STATE = importlib.import_module("onnxruntime.capi.onnxruntime_pybind11_state")
 
@@ -166,6 +172,9 @@ def _expected(model: Document, rows: Sequence[Row]) -> Iterator[tuple[Values, Bo
                 "label": [answer.label or ""],
                 "status": [int(answer.status)],
                 "strengths": answer.strengths,
+                "probabilities": row_probabilities(model, answer)
+                if isinstance(model, RuleBase) and model.semantics.sharpness
+                else (),
             },
             {},
         )

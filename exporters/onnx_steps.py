@@ -583,6 +583,7 @@ _BLOCKS: Mapping[str, ResultKind] = {
     "outputs": "output",
     "activations": "activation",
     "strengths": "strength",
+    "probabilities": "probability",
 }
 _WHOLE: Mapping[str, ResultKind] = {"status": "status", "rule": "rule"}
 

@@ -61,6 +61,21 @@ class NumberType:
         return result
 
 
+def check_rated(model: Document, form: str) -> None:
+    """Refuse to write probabilities that a model does not have.
+
+    Raises:
+        ValueError: If it is no rule base with probabilities.
+    """
+    if isinstance(model, FuzzySystem):
+        raise ValueError(f"{form}: a fuzzy system has no probabilities of classes")
+    if not model.semantics.sharpness:
+        raise ValueError(f"{form}: {model.name!r} has no probabilities")
+    if isinstance(model, FuzzyTree):
+        text = "a tree's path gives no probabilities; write its rules to have them"
+        raise ValueError(f"{form}: {text}")
+
+
 def title_of(model: Document, name: str) -> str:
     """Return what a file is of, with the model's name as the file may write it."""
     kinds = {FuzzyTree: "tree", RuleBase: "rule base", FuzzySystem: "system"}

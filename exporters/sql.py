@@ -16,11 +16,13 @@ from typing import ClassVar, Literal, get_args
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.program_text import (
     StepText,
+    check_rated,
     named_steps,
     strengths_of,
     title_of,
 )
 from fuzzytree.model import (
+    WEIGHT_OF_ONE,
     Format,
     FuzzyTree,
     Model,
@@ -28,7 +30,9 @@ from fuzzytree.model import (
     RuleBase,
     Written,
     fingerprint,
+    parts_of,
     sentence,
+    squarings,
 )
 from fuzzytree.semantics import Step
 
@@ -52,6 +56,7 @@ def write(
     table: str = "data",
     keep: Sequence[str] | str = (),
     strengths: bool = False,
+    probabilities: bool = False,
 ) -> Written:
     """Return a model as the text of one SQL query, in UTF-8.
 
@@ -67,10 +72,13 @@ def write(
         keep: Columns of the table to give beside the answer, such as its key; the
             inputs unless given.
         strengths: Whether to give the strength of each rule as well.
+        probabilities: Whether to give the probability of each class as well, in the
+            order of the classes; the rule base must have them.
 
     Raises:
         LossError: If the model is beyond what engines hold.
-        ValueError: If there is no such dialect, or the table has no name.
+        ValueError: If there is no such dialect, the table has no name, or
+            probabilities are wanted that the model does not have.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -84,6 +92,8 @@ def write(
         raise ValueError(f"sql has no dialect {dialect!r}; there is {', '.join(known)}")
     if not table:
         raise ValueError("table: must name a table or a view, not ''")
+    if probabilities:
+        check_rated(model, "sql")
     names = (keep,) if isinstance(keep, str) else tuple(keep)
     query = Query(dialect, table, names or model.inputs)
     if isinstance(model, RuleBase):
@@ -93,7 +103,9 @@ def write(
                 f"and engines allow {MOST_RULES} as columns of a query; write the tree "
                 "instead"
             )
-        steps = _rule_steps(query, model, with_strengths=strengths)
+        steps = _rule_steps(
+            query, model, with_strengths=strengths, with_probabilities=probabilities
+        )
     else:
         if strengths:
             raise ValueError("sql: a tree has no strengths; its rules have")
@@ -200,15 +212,22 @@ def _tree_steps(query: Query, tree: FuzzyTree) -> Iterator[str]:
     yield from _last(query, label, "leaf", "CASE WHEN is_known = 1 THEN 0 ELSE 3 END")
 
 
-def _last(query: Query, label: str, rule: str, status: str) -> Iterator[str]:
+def _last(
+    query: Query,
+    label: str,
+    rule: str,
+    status: str,
+    more: Sequence[str] = (),
+    source: str = "answers",
+) -> Iterator[str]:
     kept = [f"kept_{k} AS {query.name(n)}" for k, n in enumerate(query.keep, 1)]
     result = [f"{label} AS {query.name('class')}"]
     result += [f"{rule} AS {query.name('rule')}", f"{status} AS {query.name('status')}"]
-    yield f"SELECT\n{_listed([*kept, *result])}\nFROM answers"
+    yield f"SELECT\n{_listed([*kept, *result, *more])}\nFROM {source}"
 
 
 def _rule_steps(
-    query: Query, rules: RuleBase, *, with_strengths: bool
+    query: Query, rules: RuleBase, *, with_strengths: bool, with_probabilities: bool
 ) -> Iterator[str]:
     steps = SqlSteps(query, rules)
     before = "known"
@@ -224,7 +243,12 @@ def _rule_steps(
     ]
     yield query.step("fired", is_heavy=True)
     yield _commented([f"{before}.*", *fired]) + f"\n  FROM {before}\n),"
-    yield from _decision(query, rules, with_strengths=with_strengths)
+    yield from _decision(
+        query,
+        rules,
+        with_strengths=with_strengths,
+        with_probabilities=with_probabilities,
+    )
 
 
 def _commented(lines: Sequence[str]) -> str:
@@ -237,7 +261,9 @@ def _commented(lines: Sequence[str]) -> str:
     return "  SELECT\n" + "\n".join(shown)
 
 
-def _decision(query: Query, rules: RuleBase, *, with_strengths: bool) -> Iterator[str]:
+def _decision(
+    query: Query, rules: RuleBase, *, with_strengths: bool, with_probabilities: bool
+) -> Iterator[str]:
     numbers = range(1, len(rules.rules) + 1)
     yield query.step("best", is_heavy=True)
     best = query.greatest(*(f"s_{k}" for k in numbers))
@@ -249,7 +275,10 @@ def _decision(query: Query, rules: RuleBase, *, with_strengths: bool) -> Iterato
         "  SELECT best.*,\n  CASE WHEN is_known = 0 THEN 0\n"
         "    WHEN best = 0e0 THEN 0\n"
         f"    {wins}\n  END AS winner,\n    {ties}\n  AS equals\n  FROM best\n)"
+        + ("," if with_probabilities else "")
     )
+    if with_probabilities:
+        yield from _mixing(query, rules)
     ends = [
         f"WHEN winner = {number} THEN {query.text(rule.then)}"
         for number, rule in enumerate(rules.rules, 1)
@@ -267,14 +296,74 @@ def _decision(query: Query, rules: RuleBase, *, with_strengths: bool) -> Iterato
         "CASE WHEN is_known = 0 THEN 3 WHEN winner = 0 THEN 2 "
         "WHEN equals > 1 THEN 1 ELSE 0 END"
     )
-    lines = list(_last(query, label, "winner", status))
+    shown: list[str] = []
     if with_strengths:
         shown = [
             f"CASE WHEN is_known = 1 THEN s_{k} END AS strength_{k}" for k in numbers
         ]
-        head, mark, tail = lines[0].rpartition("\nFROM")
-        lines = [f"{head},\n{_listed(shown)}{mark}{tail}"]
-    yield from lines
+    if with_probabilities:
+        shown += [
+            f"CASE WHEN winner > 0 THEN n_{k} / total END AS probability_{k}"
+            for k in range(1, len(rules.classes) + 1)
+        ]
+    source = "mixed" if with_probabilities else "answers"
+    yield from _last(query, label, "winner", status, shown, source)
+
+
+def _mixing(query: Query, rules: RuleBase) -> Iterator[str]:
+    """Yield the steps from strengths to the count of each class, and their total."""
+    numbers = range(1, len(rules.rules) + 1)
+    classes = range(1, len(rules.classes) + 1)
+    kept = [f"kept_{k}" for k in range(1, len(query.keep) + 1)]
+    kept += ["is_known", "winner", "equals", *(f"s_{k}" for k in numbers)]
+
+    def step(name: str, before: str, columns: Iterable[str]) -> str:
+        text = _listed([*kept, *columns])
+        head = query.step(name, is_heavy=True)
+        return f"{head}\n  SELECT\n{text}\n  FROM {before}\n)"
+
+    before = "answers"
+    powers = [f"s_{k}" for k in numbers]
+    for number in range(1, squarings(rules.semantics.sharpness) + 1):
+        squares = [f"{p} * {p} AS p_{k}" for k, p in enumerate(powers, 1)]
+        yield step(f"power_{number}", before, squares) + ","
+        before, powers = f"power_{number}", [f"p_{k}" for k in numbers]
+    weight = query.number(float(WEIGHT_OF_ONE))
+    weights = [query.floor(f"{weight} * {p}") for p in powers]
+    columns = [f"{one} AS w_{k}" for k, one in enumerate(weights, 1)]
+    yield step("weights", before, columns) + ","
+    vectors = [parts_of(rule.probabilities) for rule in rules.rules]
+    counts = [
+        " + ".join(
+            f"w_{k} * {query.number(float(vector[place - 1]))}"
+            for k, vector in enumerate(vectors, 1)
+            if vector[place - 1]
+        )
+        or "0e0"
+        for place in classes
+    ]
+    owners = " ".join(
+        f"WHEN {k} THEN {rules.classes.index(rule.then) + 1}"
+        for k, rule in enumerate(rules.rules, 1)
+    )
+    columns = [f"{one} AS n_{place}" for place, one in enumerate(counts, 1)]
+    yield (
+        step("counts", "weights", [*columns, f"CASE winner {owners} END AS own"]) + ","
+    )
+    others = [f"CASE WHEN own = {k} THEN 0e0 ELSE n_{k} END" for k in classes]
+    top = f"{query.greatest(*others)} AS top"
+    kept += [*(f"n_{k}" for k in classes), "own"]
+    yield step("tops", "counts", [top]) + ","
+    kept = kept[: -len(classes) - 1]
+    raised = [
+        f"CASE WHEN own = {k} THEN {query.greatest(f'n_{k}', 'top + 1e0')} "
+        f"ELSE n_{k} END AS n_{k}"
+        for k in classes
+    ]
+    yield step("raised", "tops", raised) + ","
+    kept += [f"n_{k}" for k in classes]
+    total = " + ".join(f"n_{k}" for k in classes)
+    yield step("mixed", "raised", [f"{total} AS total"])
 
 
 _MOST_ARGUMENTS = 60  # of one function; SQLite takes 100
@@ -337,6 +426,12 @@ class Query:
         if self.dialect == "sqlite" and not _is_decimal(value):
             return f"({_ratio(value)})"
         return f"({text})" if text.startswith("-") else text
+
+    def floor(self, term: str) -> str:
+        """Return the largest whole number up to an expression that is not negative."""
+        if self.dialect == "sqlite":  # it may be built without floor
+            return f"CAST(CAST({term} AS INTEGER) AS REAL)"
+        return f"FLOOR({term})"
 
     def least(self, *terms: str) -> str:
         """Return the smallest of some expressions."""

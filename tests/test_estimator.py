@@ -27,7 +27,7 @@ from fuzzytree.estimator import FuzzyTreeClassifier, Mode
 from fuzzytree.model.rulebase import Band, Part, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.reference import descend, evaluate, probabilities
+from fuzzytree.semantics.reference import descend, evaluate, row_probabilities
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray, IntArray
@@ -56,7 +56,7 @@ def test_the_probabilities_are_those_of_the_reference() -> None:
     found = model.predict_proba(IRIS[50:60])
     for row, shares in zip(IRIS[50:60], found, strict=True):
         answer = evaluate(rules, dict(zip(["x1", "x2", "x3", "x4"], row, strict=True)))
-        assert tuple(shares) == probabilities(rules, answer)
+        assert tuple(shares) == row_probabilities(rules, answer)
 
 
 def test_the_probabilities_are_better_than_the_frequencies_of_the_classes() -> None:

@@ -29,7 +29,7 @@ from fuzzytree.numerics import (
     strength_bounds,
     strength_errors,
 )
-from fuzzytree.runtimes import baseline, predictions_of
+from fuzzytree.runtimes import baseline, class_probabilities, predictions_of
 from fuzzytree.semantics import Status, probe_values
 
 _SHOWN = 5  # differing rows listed for each comparison
@@ -176,15 +176,31 @@ def compare_bits(
 ) -> Comparison:
     """Demand equal rules, classes, statuses, and strengths where both have them.
 
-    Strengths are compared bit by bit: 0.0 is not -0.0, and NaN is one value. Rows that
+    Strengths are compared bit by bit: 0.0 is not -0.0, and NaN is one value; so are
+    probabilities, where the first one has them. Rows that
     are excused may differ, for the reason that `origin` states.
     """
     gap = strength_gap(actual.outcome, expected.outcome)
     wrong = unequal(actual.outcome, expected.outcome)
     wrong |= labels(actual) != labels(expected)
+    wrong |= _other_probabilities(actual, expected)
     if excused is None:
         return _compared(actual, expected, rows, wrong, gap)
     return _compared(actual, expected, rows, wrong & ~excused, gap, origin=origin)
+
+
+def _other_probabilities(actual: ModelRun, expected: ModelRun) -> BoolArray:
+    """Return the rows in which a runtime's probabilities are not the model's."""
+    result, strengths = actual.outcome.probabilities, expected.outcome.strengths
+    model = expected.model
+    if result is None or strengths is None or not isinstance(model, RuleBase):
+        return np.zeros(actual.outcome.rule.shape, np.bool_)
+    right = class_probabilities(model, strengths, expected.outcome.rule)
+    if right is None or right.shape != result.shape:
+        return np.ones(actual.outcome.rule.shape, np.bool_)
+    wrong = np.zeros(actual.outcome.rule.shape, np.bool_)
+    wrong |= ~same_bits(result, right).all(axis=0)
+    return wrong
 
 
 def unequal(one: Outcome, two: Outcome) -> BoolArray:
@@ -402,7 +418,11 @@ def _compared(
 def _row_text(actual: ModelRun, expected: ModelRun, rows: RowSet, row: int) -> str:
     wanted, got = _answer_text(expected, row), _answer_text(actual, row)
     if wanted == got:
-        return f"{rows.text(row)}: both answer {got}{_apart(actual, expected, row)}"
+        apart = _apart(actual, expected, row)
+        one, two = actual.part(slice(row, row + 1)), expected.part(slice(row, row + 1))
+        if not unequal(one.outcome, two.outcome).any():
+            apart = ", with other probabilities"
+        return f"{rows.text(row)}: both answer {got}{apart}"
     return f"{rows.text(row)}: {expected.title} answers {wanted}, {actual.title} {got}"
 
 

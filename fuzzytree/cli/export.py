@@ -42,7 +42,8 @@ class ExportOptions(WritingOptions):
         choices=["needed", "all"],
     )
     outputs: str | None = option(
-        "--outputs NAMES", "onnx: outputs of the graph, of label,rule,status,strengths."
+        "--outputs NAMES",
+        "onnx: outputs of the graph, of label,rule,status,strengths,probabilities.",
     )
     readable: bool = flag(
         "--readable", "onnx: write a node with a name for each step of rules."

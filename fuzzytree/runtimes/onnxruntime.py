@@ -147,11 +147,13 @@ def prepare(
     readable: bool = False,
     plain: bool = False,
     threads: int = 1,
+    probabilities: bool = False,
 ) -> Prepared:
     """Write a model as ONNX, in memory, and open it.
 
     A `readable` graph of rules has a node for each operation, for people; a `plain` one
     of a tree has no tree operators. One call uses at most `threads` threads.
+    `probabilities` are returned of rules that have them.
 
     Raises:
         LossError: If the number type or the kind of graph cannot hold the model.
@@ -166,6 +168,8 @@ def prepare(
     outputs: tuple[Output, ...] = ("rule", "status", "strengths")
     if isinstance(model, FuzzyTree):
         outputs = outputs[:2]
+    elif probabilities and model.semantics.sharpness:
+        outputs = (*outputs, "probabilities")
     content = write_onnx(
         model,
         dtype=dtype,
@@ -204,6 +208,7 @@ def _caller(
     names, size, tabulated = list(names), _rows_at_once(facts), _tabulator(facts)
     widths = {"strengths": facts.rules, "activations": facts.rules}
     widths["outputs"] = len(facts.names)
+    widths["probabilities"] = len(facts.classes)
     kinds = dict.fromkeys(widths, np.dtype(np.float64)) | {"label": np.dtype(object)}
     lasts = {"rule": facts.rules, "status": 3}
     results = [
@@ -289,7 +294,8 @@ def _outcome(outputs: Outputs, values: FloatArray) -> Outcome:
         if not (rule.item() if len(rule) == 1 else rule.all()):
             none = np.where(np.isfinite(values).all(axis=0), 2, 3)
             status = np.where(rule > 0, 0, none)
-    return Outcome(rule, status, outputs.get("strengths"))
+    rated = outputs.get("probabilities")
+    return Outcome(rule, status, outputs.get("strengths"), rated)
 
 
 def _refuse(name: str, values: FloatArray) -> Outcome:
@@ -517,7 +523,7 @@ def _runtime(
         load_system=load_system if "system" in runs else None,
         name=f"onnxruntime {name}",
         runs=runs,
-        load=lambda model: make(model).run,
+        load=lambda model: make(model, probabilities=True).run,
         dtype=dtype,
         cannot=cannot,
         extra="onnx",

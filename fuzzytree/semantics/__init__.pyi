@@ -82,6 +82,7 @@ from .reference import degree as degree
 from .reference import descend as descend
 from .reference import evaluate as evaluate
 from .reference import proposition_degree as proposition_degree
+from .reference import row_probabilities as row_probabilities
 from .samples import all_samples as all_samples
 from .simplification import Pruned as Pruned
 from .simplification import Removed as Removed

@@ -110,7 +110,7 @@ def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:
     return Answer(winner + 1, rules.rules[winner].then, status, strengths)
 
 
-def probabilities(rules: RuleBase, answer: Answer) -> tuple[float, ...]:
+def row_probabilities(rules: RuleBase, answer: Answer) -> tuple[float, ...]:
     """Return the probability of each class, as `fuzzytree.model.probabilities` says.
 
     Returns:

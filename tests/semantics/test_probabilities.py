@@ -22,7 +22,7 @@ from fuzzytree.semantics.conversion.facts import as_rules, facts_of
 from fuzzytree.semantics.conversion.scores import as_system
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probe_values
-from fuzzytree.semantics.reference import Status, evaluate, probabilities
+from fuzzytree.semantics.reference import Status, evaluate, row_probabilities
 from fuzzytree.testing import random_tree, rated
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def test_numpy_gives_the_bits_of_the_reference(seed: int) -> None:
     assert mixed is not None
     for row, found in zip(values.T.tolist(), mixed.T, strict=True):
         answer = evaluate(rules, dict(zip(rules.inputs, row, strict=True)))
-        expected = probabilities(rules, answer)
+        expected = row_probabilities(rules, answer)
         if answer.status is Status.MISSING:
             assert np.isnan([*found, *expected]).all()
             continue

@@ -5,33 +5,41 @@ A tree is no program, for a row passes few of its nodes; the values of its nodes
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from fuzzytree.model import (
+    WEIGHT_OF_ONE,
     FuzzyTree,
     Proposition,
     Rule,
     RuleBase,
     SystemOutput,
     Variable,
+    parts_of,
     proposition_text,
     shapes_of,
+    squarings,
 )
-from fuzzytree.semantics.programs.steps import Maker, Place, Program, result_of
+from fuzzytree.semantics.programs.steps import Maker, Place, Program, Result, result_of
 
 DECIDED, TIE, UNCOVERED, MISSING = 0.0, 1.0, 2.0, 3.0
 
 
-def from_rules(rules: RuleBase) -> Program:
+def from_rules(rules: RuleBase, *, probabilities: bool = False) -> Program:
     """Return the program of a rule base.
 
     It performs the operations of `fuzzytree.semantics.reference.evaluate` in the same
     order, so its strengths have the same bits. Rows with a value that is missing or not
     finite, or with a combination that is not, have strengths NaN, rule 0 and status 3.
 
+    Args:
+        rules: The rule base.
+        probabilities: Whether the probability of each class is a result; the rule base
+            must have them.
+
     Returns:
-        A program with the results `strength` of each rule, `rule`, `status` and
-        `class`.
+        A program with the results `strength` of each rule, `rule`, `status`, `class`
+        and, if requested, `probability` of each class.
 
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
@@ -71,6 +79,8 @@ def from_rules(rules: RuleBase) -> Program:
         result_of("status", "status", status),
         result_of("class", "class", answer),
     ]
+    if probabilities:
+        results += _probabilities(make, rules, strengths, rule)
     return make.program(rules.name, rules.inputs, tuple(results))
 
 
@@ -160,6 +170,44 @@ def _first(make: Maker, hits: list[Place], numbers: list[int]) -> Place:
     for hit, number in reversed(pairs[:-1]):
         chosen = make.where(hit, float(number), chosen)
     return chosen
+
+
+def _probabilities(
+    make: Maker, rules: RuleBase, strengths: list[Place], rule: Place
+) -> Iterator[Result]:
+    """Yield the probability of each class, as `fuzzytree.model.probabilities` says."""
+    weights: list[Place] = []
+    for number, strength in enumerate(strengths, 1):
+        with make.topic(f"weight of rule {number}"):
+            for _ in range(squarings(rules.semantics.sharpness)):
+                strength = strength * strength
+            weights.append(make("floor", strength * float(WEIGHT_OF_ONE)))
+    vectors = [parts_of(one.probabilities) for one in rules.rules]
+    zero, owners = make.constant(0.0), [float(_place_of(rules, r)) for r in rules.rules]
+    winner = make.table("pick", rule, [-1.0, *owners])
+    counts: list[Place] = []
+    others: list[Place] = []
+    is_own: list[Place] = []
+    for code, name in enumerate(rules.classes):
+        with make.topic(f"count of {name}"):
+            pairs = zip(weights, (vector[code] for vector in vectors), strict=True)
+            shares = [weight * float(part) for weight, part in pairs if part]
+            counts.append(make.chain("add", shares) if shares else zero)
+            is_own.append(make.equal(winner, make.constant(float(code))))
+            others.append(make.where(is_own[-1], zero, counts[-1]))
+    with make.topic("counts"):
+        least = make.chain("maximum", others) + 1.0
+        pairs_of = zip(counts, is_own, strict=True)
+        counts = [make.where(o, make("maximum", n, least), n) for n, o in pairs_of]
+        total = make.chain("add", counts)
+    is_none, nothing = make.equal(rule, zero), make.constant(float("nan"))
+    for name, count in zip(rules.classes, counts, strict=True):
+        share = make.where(is_none, nothing, count / total)
+        yield result_of("probability", name, share)
+
+
+def _place_of(rules: RuleBase, rule: Rule) -> int:
+    return rules.classes.index(rule.then)
 
 
 def _answer(make: Maker, rules: RuleBase, rule: Place) -> Place:

@@ -53,7 +53,9 @@ from fuzzytree.semantics.programs.operations import (
     of_table,
 )
 
-ResultKind = Literal["output", "activation", "strength", "rule", "class", "status"]
+ResultKind = Literal[
+    "output", "activation", "strength", "rule", "class", "status", "probability"
+]
 
 _LEAVES = ("constant", "input", "index")
 
@@ -90,8 +92,10 @@ class Result(Value, frozen=True):
         kind: `output`: of a system's output. `activation`, `strength`: of a rule, 0 to
             1. `rule`: the winner's number from 1, or 0. `class`: the place of the
             answer among the classes, or -1. `status`: a
-            `fuzzytree.semantics.reference.Status` as a number.
-        name: Of the output; the rule's number, from 1, for activations and strengths.
+            `fuzzytree.semantics.reference.Status` as a number. `probability`: of a
+            class, NaN without a rule.
+        name: Of the output or class; the rule's number, from 1, for activations and
+            strengths.
         step: The place of the step that it is the result of.
     """
 
@@ -104,6 +108,8 @@ class Result(Value, frozen=True):
         """What it is, in words."""
         if self.kind in ("activation", "strength"):
             return f"rule {self.name} {self.kind}"
+        if self.kind == "probability":
+            return f"probability of {self.name}"
         return self.name
 
 
