@@ -1,0 +1,152 @@
+"""The pictures of the study of quality."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from quality_statistics import BINS, cliques, critical_difference
+
+from fuzzytree.report import LETTER, Markup, Picture, mark, picture, tick_words, ticks
+from fuzzytree.report.drawing import Scale, path_of
+
+_STYLE = """
+.grid { stroke: #e4e4e4; } .axis { stroke: #595d66; fill: none; }
+.alike { stroke: #595d66; stroke-width: 4; } .lead { stroke: #c8c8c8; }
+.dot { fill: #595d66; } .ours { fill: #c04d00; font-weight: 600; }
+.same { stroke: #aaaaaa; stroke-dasharray: 4 3; }
+.name { font-size: 11px; }
+"""
+_COLOURS = ("#c04d00", "#0072b2", "#00795a", "#8a4fae", "#b08900", "#595d66", "#111111")
+_WIDE, _ROW = 760.0, 20.0
+
+
+def ranking(means: Mapping[str, float], tables: int) -> Picture:
+    """Draw mean ranks, and lines beside learners that no test tells apart.
+
+    Args:
+        means: The mean rank of each learner.
+        tables: How many tables were ranked on.
+    """
+    names = sorted(means, key=means.__getitem__)
+    ordered = [means[name] for name in names]
+    difference = critical_difference(len(names), tables)
+    runs = cliques(ordered, difference)
+    base = 60.0
+    bottom = base + _ROW * len(names)
+    x = Scale(1.0, float(len(names)), 270.0, _WIDE - 30.0 - 9.0 * len(runs))
+    marks = []
+    for rank in range(1, len(names) + 1):
+        marks.append(mark("line", x.at(rank), x.at(rank), base - 8, bottom, "grid"))
+        marks.append(mark("words", x.at(rank), base - 14, str(rank), "small", "middle"))
+    end = x.at(1.0 + difference)
+    said = f"critical difference {difference:.2f} (Nemenyi, p < .05), {tables} tables"
+    marks.append(mark("line", x.start, end, 24, 24, "axis"))
+    marks += [mark("line", at, at, 20, 28, "axis") for at in (x.start, end)]
+    marks.append(mark("words", x.start, 14, said, "small"))
+    for row, (name, mean) in enumerate(zip(names, ordered, strict=True)):
+        y = base + _ROW * (row + 0.5)
+        look = _look(name)
+        marks.append(mark("words", x.start - 14, y + 4, name, f"name {look}", "end"))
+        marks.append(mark("line", x.start - 8, x.at(mean), y, y, "lead"))
+        marks.append(_disc(x.at(mean), y, look or "dot"))
+        marks.append(mark("words", x.at(mean) + 8, y + 4, f"{mean:.1f}", "small"))
+    for column, (first, last) in enumerate(runs):
+        at = x.end + 34.0 + 9.0 * column
+        top, low = (base + _ROW * (row + 0.5) for row in (first, last))
+        marks.append(mark("line", at, at, top - 5, low + 5, "alike"))
+    return picture(marks, _WIDE + 10, bottom + 10, "mean ranks of learners", _STYLE)
+
+
+def accuracy_against_leaves(
+    points: Mapping[str, tuple[float, float]], tables: int
+) -> Picture:
+    """Draw mean accuracy against leaves; those that have none at the right edge.
+
+    Args:
+        points: Median leaves, nan where there are none, and mean accuracy.
+        tables: Over how many tables, on which all of them finished.
+    """
+    sized = [leaves for leaves, _ in points.values() if not math.isnan(leaves)]
+    found = [accuracy for _, accuracy in points.values()]
+    y = Scale(min(found) - 0.01, max(found) + 0.01, 430.0, 30.0)
+    most = math.log10(max(sized) * 1.15)
+    x = Scale(math.log10(min(sized) / 1.15), most, 60.0, 540.0)
+    marks = list(_frame(x, y))
+    for power in range(4):
+        for digit in (1, 2, 5):
+            at = math.log10(digit * 10**power)
+            if x.low <= at <= x.high:
+                marks.append(mark("line", x.at(at), x.at(at), 430, 434, "axis"))
+                text = str(digit * 10**power)
+                marks.append(mark("words", x.at(at), 446, text, "small", "middle"))
+    said = f"median of leaves or rules; accuracy is a mean over {tables} tables"
+    marks.append(mark("words", 300, 464, said, "small", "middle"))
+    taken: list[tuple[float, float, float]] = []
+    for name, (leaves, accuracy) in sorted(points.items(), key=lambda p: -p[1][1]):
+        at = x.end if math.isnan(leaves) else x.at(math.log10(leaves))
+        height = y.at(accuracy)
+        look = _look(name)
+        if not math.isnan(leaves):
+            marks.append(_disc(at, height, look or "dot"))
+        left, base = at + 8.0, height + 4.0
+        width = 11.0 * LETTER * len(name)
+        while any(
+            abs(base - other) < 12.0 and left < right and start < left + width
+            for start, right, other in taken
+        ):
+            base += 2.0
+        taken.append((left, left + width, base))
+        marks.append(mark("line", at, left - 1, height, base - 4.0, "lead"))
+        marks.append(mark("words", left, base, name, f"name {look}"))
+    low = max(470.0, max(base for *_, base in taken) + 10.0)
+    return picture(marks, _WIDE + 20, low, "accuracy against leaves", _STYLE)
+
+
+def reliability_lines(
+    bins: Mapping[str, Sequence[Sequence[Sequence[float]]]],
+) -> Picture:
+    """Draw the share of right answers against confidence, each table weighted alike.
+
+    Args:
+        bins: For each learner the bins of each table, as `reliability` returns them.
+    """
+    x, y = Scale(0.0, 1.0, 60.0, 460.0), Scale(0.0, 1.0, 430.0, 30.0)
+    marks = list(_frame(x, y))
+    for value in ticks(0.0, 1.0):
+        marks.append(mark("words", x.at(value), 446, f"{value:g}", "small", "middle"))
+    marks.append(mark("line", x.at(0), x.at(1), y.at(0), y.at(1), "same"))
+    marks.append(mark("words", 260, 464, "probability given", "small", "middle"))
+    rules = [_STYLE]
+    for row, (name, of_tables) in enumerate(bins.items()):
+        colour = _COLOURS[row % len(_COLOURS)]
+        rules.append(f".l{row} {{ stroke: {colour}; stroke-width: 2; fill: none; }}\n")
+        shares = [np.array(one) / np.sum(one, axis=0)[0] for one in of_tables]
+        rows, confidence, hits = np.mean(shares, axis=0).T
+        seen = rows > 1.0 / (100 * BINS)
+        dots = zip(confidence[seen] / rows[seen], hits[seen] / rows[seen], strict=True)
+        ways = [(x.at(given), y.at(right)) for given, right in dots]
+        marks.append(mark("path", path_of(ways), f"l{row}"))
+        high = 44.0 + _ROW * row
+        marks.append(mark("line", 490, 520, high - 4, high - 4, f"l{row}"))
+        marks.append(mark("words", 528, high, name, "name"))
+    return picture(marks, _WIDE, 470, "reliability of probabilities", "".join(rules))
+
+
+def _frame(x: Scale, y: Scale) -> Iterator[Markup]:
+    for value, word in zip(
+        values := ticks(y.low, y.high, 8), tick_words(values), strict=True
+    ):
+        yield mark("line", x.start, x.end, y.at(value), y.at(value), "grid")
+        yield mark("words", x.start - 6, y.at(value) + 4, word, "small", "end")
+    yield mark("rect", x.start, y.end, x.end - x.start, y.start - y.end, "axis")
+
+
+def _disc(x: float, y: float, look: str) -> Markup:
+    way = f"M{x - 4:.1f} {y:.1f}a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z"
+    return mark("path", way, look)
+
+
+def _look(name: str) -> str:
+    return "ours" if name.startswith("fuzzytree") else ""
