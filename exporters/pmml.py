@@ -30,9 +30,15 @@ from fuzzytree.exporters.pmml_elements import (
     schema,
 )
 from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields, step_value
-from fuzzytree.exporters.program_text import named_steps, strengths_of, title_of
+from fuzzytree.exporters.program_text import (
+    check_rated,
+    named_steps,
+    strengths_of,
+    title_of,
+)
 from fuzzytree.exporters.xml_text import XmlElement, element, text_of
 from fuzzytree.model import (
+    WEIGHT_OF_ONE,
     Document,
     Format,
     FuzzySystem,
@@ -46,9 +52,11 @@ from fuzzytree.model import (
     Written,
     fingerprint,
     intervals,
+    parts_of,
     refusal,
     sentence,
     shapes_of,
+    squarings,
     unlike,
 )
 from fuzzytree.semantics import pointed
@@ -63,6 +71,7 @@ def write(
     allow_loss: bool = False,
     curves: Literal["exact", "points"] = "exact",
     tolerance: float = 1e-3,
+    probabilities: bool = False,
 ) -> Written:
     """Return a tree, a rule base or a system as a PMML file, in UTF-8.
 
@@ -72,11 +81,14 @@ def write(
         curves: `exact`: degrees are arithmetic, with the reference's bits. `points`:
             every term is a `NormContinuous`.
         tolerance: The largest error of a degree for `points`.
+        probabilities: Whether the probability of each class is an output; the model
+            must be a rule base that has them.
 
     Raises:
         LossError: If curves would become points and `allow_loss` is False; if a system
             needs too many fields, or functions that PMML does not have.
-        ValueError: If `curves` is neither of the two, or `points` for other than rules.
+        ValueError: If `curves` is neither of the two, or `points` for other than rules;
+            if probabilities are wanted that the model does not have.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -88,6 +100,8 @@ def write(
         raise ValueError(f"curves are exact or points, not {curves!r}")
     if curves == "points" and not isinstance(model, RuleBase):
         raise ValueError("curves: points are for rules; a tree or a system is none")
+    if probabilities:
+        check_rated(model, "pmml")
     losses: tuple[Loss, ...] = ()
     if isinstance(model, RuleBase) and curves == "points":
         model, losses = pointed(model, tolerance)
@@ -99,7 +113,9 @@ def write(
     functions = names.functions
     axes = [*_axes(model.variables, functions)]
     if isinstance(model, RuleBase):
-        fields, body = _rules(model, names, is_exact=curves == "exact")
+        fields, body = _rules(
+            model, names, is_exact=curves == "exact", is_rated=probabilities
+        )
     else:
         fields, body = _tree(model, names)
     transformations = [*functions.defined.values(), *axes, *fields]
@@ -262,7 +278,7 @@ def _model(
 
 
 def _rules(
-    rules: RuleBase, names: _Names, *, is_exact: bool
+    rules: RuleBase, names: _Names, *, is_exact: bool, is_rated: bool
 ) -> tuple[list[XmlElement], XmlElement]:
     """Return the derived fields and the model of a rule base."""
     program, places = strengths_of(rules)
@@ -294,7 +310,11 @@ def _rules(
     fields.append(derived(best, joined("max", list(map(ref, strengths)))))
     winner = names.new("winner")
     fields.append(derived(winner, _winner(strengths, usable, best)))
-    outputs = _outputs(rules, strengths, usable, names)
+    outputs = [*_outputs(rules, strengths, usable, names)]
+    if is_rated:
+        more, shares = _probabilities(rules, strengths, winner, names)
+        fields += more
+        outputs += shares
     return fields, _model(rules, names, outputs, _rule_nodes(rules, winner))
 
 
@@ -318,13 +338,7 @@ def _outputs(
     is_usable = apply("equal", ref(usable), constant(1.0))
 
     def output(name: str, value: XmlElement) -> XmlElement:
-        return element(
-            "OutputField",
-            apply("if", is_usable, value),
-            name=names.new(name),
-            **NUMBER,
-            feature="transformedValue",
-        )
+        return _output(names.new(name), apply("if", is_usable, value))
 
     for k, strength in enumerate(strengths, 1):
         yield output(f"strength of rule {k}", ref(strength))
@@ -334,6 +348,63 @@ def _outputs(
     for name, parts in own.items():
         value = joined("max", parts) if parts else constant(0.0)
         yield output(f"strength of class {name}", value)
+
+
+def _output(name: str, value: XmlElement) -> XmlElement:
+    how = {"feature": "transformedValue", **NUMBER}
+    return element("OutputField", value, name=name, **how)
+
+
+def _probabilities(
+    rules: RuleBase, strengths: Sequence[str], winner: str, names: _Names
+) -> tuple[list[XmlElement], list[XmlElement]]:
+    """Return the fields and outputs of the classes' probabilities.
+
+    `fuzzytree.model.probabilities` says what they are. Sums are of whole numbers.
+    """
+    fields: list[XmlElement] = []
+
+    def field(name: str, value: XmlElement) -> XmlElement:
+        fields.append(derived(names.new(name), value))
+        return ref(fields[-1].attributes["name"])
+
+    weights: list[XmlElement] = []
+    for k, strength in enumerate(strengths, 1):
+        power = ref(strength)
+        for step in range(1, squarings(rules.semantics.sharpness) + 1):
+            power = field(f"power {2**step} of rule {k}", apply("*", power, power))
+        whole = apply("*", power, constant(WEIGHT_OF_ONE))
+        weights.append(field(f"weight of rule {k}", apply("floor", whole)))
+    counts: list[XmlElement] = []
+    is_own: list[XmlElement] = []
+    for code, name in enumerate(rules.classes):
+        shares = [
+            apply("*", weight, constant(parts_of(rule.probabilities)[code]))
+            for weight, rule in zip(weights, rules.rules, strict=True)
+        ]
+        counts.append(field(f"count of {name}", joined("sum", shares)))
+        own = [k for k, rule in enumerate(rules.rules, 1) if rule.then == name]
+        is_own.append(
+            apply("isIn", ref(winner), *(constant(float(k)) for k in own or [-2]))
+        )
+    pairs = [*zip(counts, is_own, strict=True)]
+    others = [apply("if", own, constant(0.0), count) for count, own in pairs]
+    top = apply("+", joined("max", others), constant(1.0))
+    least = field("least count", top)
+    raised = [
+        field(f"raised count of {name}", apply("if", own, apply("max", n, least), n))
+        for name, (n, own) in zip(rules.classes, pairs, strict=True)
+    ]
+    total = field("total count", joined("sum", raised))
+    is_decided = apply("greaterThan", ref(winner), constant(0.0))
+    outputs = [
+        _output(
+            names.new(f"probability of class {name}"),
+            apply("if", is_decided, apply("/", count, total)),
+        )
+        for name, count in zip(rules.classes, raised, strict=True)
+    ]
+    return fields, outputs
 
 
 def _rule_nodes(rules: RuleBase, winner: str) -> Iterator[XmlElement]:

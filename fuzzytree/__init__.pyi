@@ -6,6 +6,7 @@ from .api import check as check
 from .api import convert as convert
 from .api import diff as diff
 from .api import draw as draw
+from .api import draw_reliability as draw_reliability
 from .api import explain as explain
 from .api import export as export
 from .api import learn as learn

@@ -13,6 +13,7 @@ from .verbs import check as check
 from .verbs import convert as convert
 from .verbs import diff as diff
 from .verbs import draw as draw
+from .verbs import draw_reliability as draw_reliability
 from .verbs import explain as explain
 from .verbs import export as export
 from .verbs import learn as learn

@@ -862,6 +862,43 @@ def draw(tree: ModelSource, *, title: str | None = None) -> Picture:
     return report.draw_tree(_tree_of(tree, "draw"), title=title)
 
 
+def draw_reliability(
+    probabilities: FloatArray,
+    labels: Sequence[object] | npt.NDArray[np.generic],
+    *,
+    classes: Sequence[object] | npt.NDArray[np.generic] | None = None,
+    title: str = "",
+) -> Picture:
+    """Draw how often the likeliest class is right, over its probability.
+
+    Args:
+        probabilities: Shape (rows, classes), as `predict_proba` returns them.
+        labels: The class of each row.
+        classes: The class of each column; 0, 1, 2, ... unless given.
+        title: Above the picture.
+
+    Returns:
+        A picture, which a notebook shows; `picture.save("reliability.svg")` writes it.
+
+    Raises:
+        ValueError: If the shapes do not fit, there is no row, or a label is no class.
+
+    Example:
+        >>> shares = np.array([[0.9, 0.1], [0.2, 0.8]])
+        >>> picture = draw_reliability(shares, ["no", "yes"], classes=["no", "yes"])
+        >>> "log-loss 0.164" in picture.svg
+        True
+    """
+    columns = range(probabilities.shape[1]) if classes is None else classes
+    known = {label: code for code, label in enumerate(np.asarray(columns).tolist())}
+    rows = np.asarray(labels).tolist()
+    for label in rows:
+        if label not in known:
+            raise ValueError(f"label {label!r} is none of the classes {[*known]}")
+    codes = np.array([known[label] for label in rows], np.int64)
+    return report.draw_reliability(probabilities, codes, title=title)
+
+
 def stability(
     model: ModelSource,
     *,

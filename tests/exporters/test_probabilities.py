@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.checking.comparing import ModelRun, compare_bits, probed
-from fuzzytree.exporters import c, javascript, sql
+from fuzzytree.exporters import c, javascript, pmml, sql
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.runtimes import native
 from fuzzytree.runtimes.mixing import class_probabilities
@@ -173,10 +173,26 @@ def test_c_fills_them_in(seed: int, dtype: Any, tmp_path: Path) -> None:
         assert np.array_equal(found, wanted, equal_nan=True)
 
 
-@pytest.mark.parametrize("write", [c.write_c, javascript.write, sql.write])
+@pytest.mark.parametrize("write", [c.write_c, javascript.write, pmml.write, sql.write])
 def test_what_has_no_probabilities_is_refused(write: Any) -> None:
     bare = rules_from_tree(random_tree(1))
     with pytest.raises(ValueError, match="has no probabilities"):
         write(bare, probabilities=True)
     with pytest.raises(ValueError, match="write its rules to have them"):
         write(rated(random_tree(1), 1), probabilities=True)
+
+
+@pytest.mark.heavy
+@SEEDS
+@pytest.mark.skipif(not shutil.which("java"), reason="needs java")
+def test_pmml_has_an_output_for_each_class(seed: int) -> None:
+    engine = pytest.importorskip("jpmml_evaluator")
+    pandas = pytest.importorskip("pandas")
+    rules = rules_of(seed)
+    content = pmml.write(rules, probabilities=True).content
+    values = np.random.default_rng(seed).normal(0.0, 2.0, (len(rules.inputs), 60))
+    evaluator = engine.make_evaluator(content).verify()
+    table = pandas.DataFrame(dict(zip(rules.inputs, values, strict=True)))
+    found = evaluator.evaluateAll(table, error_col=None)[0]
+    names = [f"probability of class {name}" for name in rules.classes]
+    assert np.array_equal(found[names].to_numpy(np.float64).T, expected(rules, values))

@@ -38,10 +38,11 @@ def test_the_first_example_is_a_whole_file() -> None:
 
 
 def test_every_other_example_fits_the_layout() -> None:
-    _, size, points, sentences, nodes_and_leaves, sets = BLOCKS
+    _, size, points, sentences, rated, nodes_and_leaves, sets = BLOCKS
     bound: list[tuple[Node, type[layout.FileRecord]]] = [
         *((item, layout.VariableOfModel) for item in items(size)),
         *((item, layout.TermOfVariable) for item in items(points)),
+        *((item, layout.RuleOfModel) for item in items(rated, "rules")),
         *((item, layout.NodeOfTree) for item in items(nodes_and_leaves, "nodes")),
         *((item, layout.End) for item in items(nodes_and_leaves, "leaves")),
         *((item, layout.SetsOfVariable) for item in items(sets, "sets")),

@@ -1,0 +1,107 @@
+"""How often predictions are right, over the probability that they claim."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fuzzytree.report.drawing import Scale, path_of
+from fuzzytree.report.markup import Markup, mark
+from fuzzytree.report.pictures import Picture, picture
+from fuzzytree.report.text import counted
+
+if TYPE_CHECKING:
+    from fuzzytree.model import FloatArray, IntArray
+
+_WIDE, _HIGH = 320.0, 372.0
+_X = Scale(0.0, 1.0, 46.0, 306.0)
+_Y = Scale(0.0, 1.0, 316.0, 56.0)
+_BAR = 40.0  # high, of the most rows
+_RULES = """
+.axis { fill: none; stroke: #595d66; }
+.even { fill: none; stroke: #9aa0aa; stroke-dasharray: 4 3; }
+.rows { fill: #dfe3ea; }
+.right { fill: none; stroke: #2458b3; stroke-width: 2; }
+.dot { fill: #2458b3; }
+"""
+
+
+def draw_reliability(
+    probabilities: FloatArray, codes: IntArray, *, bins: int = 10, title: str = ""
+) -> Picture:
+    """Draw how often the likeliest class is right, over its probability.
+
+    Rows are sorted into bins by the probability of their likeliest class. A dot stands
+    at the mean of a bin's probabilities and the share of its rows that are right: on
+    the diagonal, probabilities are what they claim. Grey bars count the rows.
+
+    Args:
+        probabilities: Shape (rows, classes), as `predict_proba` returns them.
+        codes: The column of each row's own class.
+        bins: Into how many parts of equal width [0, 1] is cut.
+        title: Above the picture.
+
+    Returns:
+        A picture, which a notebook shows; `picture.save("reliability.svg")` writes it.
+
+    Raises:
+        ValueError: If the shapes do not fit, or there is no row.
+
+    Example:
+        >>> shares, codes = np.array([[0.9, 0.1], [0.2, 0.8]]), np.array([0, 1])
+        >>> "2 rows" in draw_reliability(shares, codes).svg
+        True
+    """
+    shares, own = np.asarray(probabilities, np.float64), np.asarray(codes, np.int64)
+    if shares.ndim != 2 or not shares.size or own.shape != shares.shape[:1]:
+        raise ValueError(
+            f"probabilities of shape (rows, classes) and a code for each row, not "
+            f"{shares.shape} and {own.shape}"
+        )
+    claimed, is_right = shares.max(axis=1), shares.argmax(axis=1) == own
+    place = np.minimum((claimed * bins).astype(np.int64), bins - 1)
+    rows = np.bincount(place, minlength=bins)
+    filled = np.flatnonzero(rows)
+    claims = np.bincount(place, claimed, minlength=bins)[filled] / rows[filled]
+    rights = np.bincount(place, is_right, minlength=bins)[filled] / rows[filled]
+    error = float((rows[filled] * np.abs(claims - rights)).sum() / len(own))
+    chances = shares[np.arange(len(own)), own]
+    loss = -float(np.log(np.maximum(chances, 1e-15)).mean())
+    facts = f"{counted(len(own), 'row')}: log-loss {loss:.3f}, calibration error "
+    facts += f"{error:.3f}"
+    heading = title or "How often predictions are right"
+    dots = [
+        (_X.at(x), _Y.at(y))
+        for x, y in zip(claims.tolist(), rights.tolist(), strict=True)
+    ]
+    marks = [
+        mark("words", 10, 22, heading, "strong"),
+        mark("words", 10, 40, facts, "small"),
+        *_frame(rows.tolist()),
+        mark("path", path_of(dots), "right"),
+        *(mark("rect", x - 3, y - 3, 6, 6, "dot") for x, y in dots),
+    ]
+    return picture(marks, _WIDE, _HIGH, f"{heading}; {facts}", _RULES)
+
+
+def _frame(rows: list[int]) -> Iterator[Markup]:
+    """Yield the bars of the rows, the diagonal, and the axes with their numbers."""
+    base, top = _Y.start, _Y.end
+    step = (_X.end - _X.start) / len(rows)
+    for place, count in enumerate(rows):
+        high = _BAR * count / max(rows)
+        left = _X.start + step * place
+        yield mark("rect", left + 1, base - high, step - 2, high, "rows")
+    yield mark("path", path_of([(_X.start, base), (_X.end, top)]), "even")
+    yield mark("rect", _X.start, top, _X.end - _X.start, base - top, "axis")
+    for value, word in ((0.0, "0"), (0.5, "0.5"), (1.0, "1")):
+        yield mark("words", _X.at(value), base + 15, word, "small", "middle")
+        yield mark("words", _X.start - 6, _Y.at(value) + 4, word, "small", "end")
+    middle = (_X.start + _X.end) / 2
+    about = "probability of the predicted class"
+    yield mark("words", middle, base + 36, about, "small", "middle")
+    turned = f"translate(14 {(base + top) / 2:.1f}) rotate(-90)"
+    said = mark("words", 0, 0, "share of rows that are right", "small", "middle")
+    yield mark("group", [said], move=turned)
