@@ -47,7 +47,6 @@ from quality_statistics import reliability
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "docs/explanation/quality.json"
-SECONDS = 30.0  # of CPU time for a fold
 LEAST = 1e-15  # probability in a logarithm
 
 Result = dict[str, Any]
@@ -59,7 +58,9 @@ def main() -> int:
     parser.add_argument("--run", nargs="*", choices=LEARNERS, metavar="LEARNER")
     parser.add_argument("--tables", nargs="+", metavar="TABLE")
     parser.add_argument("--all-tables", action="store_true", help="fuzzytree on n to z")
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="of a fold")
+    parser.add_argument(
+        "--seconds", type=float, default=tables.SECONDS, help="of a fold"
+    )
     parser.add_argument("--folder", type=Path, default=ROOT / "out/quality")
     parser.add_argument("--page", action="store_true", help="collect and write")
     options = parser.parse_args()

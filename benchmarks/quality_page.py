@@ -119,7 +119,7 @@ def write(results: Results, path: Path) -> None:
         for is_small in (False, True):
             lines += _group(results, names, is_small, path, suffix)
         lines += _pictures(results, names, path, suffix)
-    head = HEAD.format(seconds=30, machine=results["machine"])
+    head = HEAD.format(seconds=tables.SECONDS, machine=results["machine"])
     page = [head.rstrip(), *lines, *_every_table(results), *_learners(results)]
     write_atomically(path.with_suffix(".md"), "\n".join([*page, ""]).encode())
 
@@ -290,8 +290,8 @@ def _against(
 ) -> Iterator[str]:
     yield f"**{reference}** against others, on tables that both finished:"
     yield ""
-    yield "| against | won : lost | beyond noise | lost beyond noise |"
-    yield "| --- | --- | --- | --- |"
+    yield "| against | won : lost | beyond noise | log-loss | lost beyond noise |"
+    yield "| --- | --- | --- | --- | --- |"
     for peer in peers:
         pairs = [
             (table, ours, theirs)
@@ -301,15 +301,28 @@ def _against(
         ]
         if not pairs:
             continue
-        apart = [float(np.mean(ours) - np.mean(theirs)) for _, ours, theirs in pairs]
         noise = [verdict(ours, theirs) for _, ours, theirs in pairs]
         lost = [pair[0] for pair, one in zip(pairs, noise, strict=True) if one < 0]
-        won = f"{sum(d > 1e-9 for d in apart)} : {sum(d < -1e-9 for d in apart)}"
+        right = [float(np.mean(ours) - np.mean(theirs)) for _, ours, theirs in pairs]
+        both = [
+            [results["tables"][table]["learners"][one] for one in (reference, peer)]
+            for table, *_ in pairs
+        ]
+        losses = [
+            theirs["log_loss"] - ours["log_loss"]
+            for ours, theirs in both
+            if "log_loss" in theirs
+        ]
         yield (
-            f"| {peer} | {won} | {noise.count(1)} : {noise.count(-1)} |"
-            f" {', '.join(lost) or '-'} |"
+            f"| {peer} | {_score(right)} | {noise.count(1)} : {noise.count(-1)} |"
+            f" {_score(losses) if losses else '-'} | {', '.join(lost) or '-'} |"
         )
     yield ""
+
+
+def _score(differences: Iterable[float]) -> str:
+    signs = np.sign(np.round([*differences], 9))
+    return f"{(signs > 0).sum()} : {(signs < 0).sum()}"
 
 
 def _every_table(results: Results) -> Iterator[str]:

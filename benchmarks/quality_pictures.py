@@ -16,7 +16,7 @@ _STYLE = """
 .alike { stroke: #595d66; stroke-width: 4; } .lead { stroke: #c8c8c8; }
 .dot { fill: #595d66; } .ours { fill: #c04d00; font-weight: 600; }
 .same { stroke: #aaaaaa; stroke-dasharray: 4 3; }
-.name { font-size: 11px; }
+.name { font-size: 11px; stroke: #ffffff; stroke-width: 2.5; paint-order: stroke; }
 """
 _COLOURS = ("#c04d00", "#0072b2", "#00795a", "#8a4fae", "#b08900", "#595d66", "#111111")
 _WIDE, _ROW = 760.0, 20.0
@@ -68,11 +68,11 @@ def accuracy_against_leaves(
         points: Median leaves, nan where there are none, and mean accuracy.
         tables: Over how many tables, on which all of them finished.
     """
-    sized = [leaves for leaves, _ in points.values() if not math.isnan(leaves)]
+    sized = {name: one for name, (one, _) in points.items() if not math.isnan(one)}
     found = [accuracy for _, accuracy in points.values()]
     y = Scale(min(found) - 0.01, max(found) + 0.01, 430.0, 30.0)
-    most = math.log10(max(sized) * 1.15)
-    x = Scale(math.log10(min(sized) / 1.15), most, 60.0, 540.0)
+    most = math.log10(max(sized.values()) * 1.15)
+    x = Scale(math.log10(min(sized.values()) / 1.15), most, 60.0, 540.0)
     marks = list(_frame(x, y))
     for power in range(4):
         for digit in (1, 2, 5):
@@ -83,23 +83,27 @@ def accuracy_against_leaves(
                 marks.append(mark("words", x.at(at), 446, text, "small", "middle"))
     said = f"median of leaves or rules; accuracy is a mean over {tables} tables"
     marks.append(mark("words", 300, 464, said, "small", "middle"))
-    taken: list[tuple[float, float, float]] = []
-    for name, (leaves, accuracy) in sorted(points.items(), key=lambda p: -p[1][1]):
-        at = x.end if math.isnan(leaves) else x.at(math.log10(leaves))
-        height = y.at(accuracy)
-        look = _look(name)
-        if not math.isnan(leaves):
-            marks.append(_disc(at, height, look or "dot"))
-        left, base = at + 8.0, height + 4.0
-        width = 11.0 * LETTER * len(name)
-        while any(
-            abs(base - other) < 12.0 and left < right and start < left + width
-            for start, right, other in taken
-        ):
-            base += 2.0
-        taken.append((left, left + width, base))
+    places = {
+        name: (x.end if math.isnan(size) else x.at(math.log10(size)), y.at(accuracy))
+        for name, (size, accuracy) in points.items()
+    }
+    taken = [(at - 5, at + 5, high + 4) for at, high in places.values() if at < x.end]
+    for name, (at, height) in sorted(places.items(), key=lambda place: place[1][1]):
+        left, right = at + 8.0, at + 8.0 + 10.5 * LETTER * len(name)
+        base = next(
+            height + 4.0 + shift
+            for shift in sorted(range(-400, 401), key=abs)
+            if not any(
+                abs(height + 4.0 + shift - other) < 11.0
+                and left < end
+                and start < right
+                for start, end, other in taken
+            )
+        )
+        taken.append((left, right, base))
         marks.append(mark("line", at, left - 1, height, base - 4.0, "lead"))
-        marks.append(mark("words", left, base, name, f"name {look}"))
+        marks.append(mark("words", left, base, name, f"name {_look(name)}"))
+    marks += [_disc(*places[name], _look(name) or "dot") for name in sized]
     low = max(470.0, max(base for *_, base in taken) + 10.0)
     return picture(marks, _WIDE + 20, low, "accuracy against leaves", _STYLE)
 

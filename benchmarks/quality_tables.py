@@ -19,6 +19,7 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 FOLDS = 10
+SECONDS = 30.0  # of CPU time for a fold
 SHIPPED = ("breast_cancer", "digits", "iris", "wine")
 SHIPPED_SUFFIX = " (scikit-learn)"
 

@@ -154,3 +154,42 @@ def test_a_run_goes_on_and_the_page_has_what_was_found(
     words = page.with_suffix(".md").read_text()
     assert f"| {WINE.name} | 178 x 13, 3 | 39.9 |" in words
     assert "Not looked at yet." in words
+
+
+def _cell(accuracy: float, leaves: int | None) -> dict[str, Any]:
+    rng = np.random.default_rng(int(1000 * accuracy))
+    folds = (accuracy + 0.01 * rng.normal(size=FOLDS)).round(4).tolist()
+    cell: dict[str, Any] = {"accuracy": folds, "seconds": 0.1, "package": "some 1.0"}
+    cell["log_loss"] = 1.0 - accuracy
+    cell["bins"] = [[0.0, 0.0, 0.0]] * 9 + [[100.0, 95.0, 100.0 * accuracy]]
+    if leaves:
+        cell |= {"leaves": [leaves] * FOLDS, "columns": 2.0}
+    return cell
+
+
+def test_the_page_draws_and_counts_what_was_found(tmp_path: Path) -> None:
+    facts = {"rows": 100, "columns": 4, "classes": 2, "most_frequent": 0.5}
+    learners = {
+        "fuzzytree": _cell(0.9, 4),
+        "fuzzytree, one column": _cell(0.85, 4),
+        "DecisionTree": _cell(0.8, 30),
+        "LDA": _cell(0.95, None),
+        "fuzzytree, 10 leaves": _cell(0.9, 4),
+        "DecisionTree, 10 leaves": _cell(0.8, 10),
+        "FIGS, 10 leaves": _cell(0.7, 10),
+    }
+    slow = {"EBM": {"failed": "over 30 s", "package": "interpret 1.0"}}
+    results = {name: {**facts, "learners": learners | slow} for name in ("a", "b", "c")}
+    path = tmp_path / "quality.json"
+    quality_page.write({"machine": "one", "tables": results}, path)
+    words = path.with_suffix(".md").read_text()
+    assert "| DecisionTree | 3 : 0 | 3 : 0 | 3 : 0 | - |" in words
+    assert "| LDA | 0 : 3 | 0 : 3 | 0 : 3 | a, b, c |" in words
+    assert "| EBM | interpret 1.0 | a, b, c (over 30 s) |" in words
+    pictures = sorted(one.name for one in tmp_path.glob("*.svg"))
+    assert pictures == [
+        f"quality-{name}-a-m.svg"
+        for name in ("leaves", "ranks-all", "ranks-small", "reliability")
+    ]
+    assert all(f"]({name})" in words for name in pictures)
+    assert json.loads(path.read_bytes())["tables"] == results
