@@ -4,8 +4,9 @@ A table is a path, an open stream of CSV or Parquet, a pandas, polars or arrow t
 reader of record batches, or a numpy array. A path is a CSV, Parquet or Arrow file, a
 folder or a pattern of such files (`rows/*.csv`), or a place that pyarrow opens
 (`s3://place/rows.parquet`). Nothing is guessed: columns are found by their names, a
-number has a decimal point and no thousands separators, and a cell that is neither a
-number nor missing is an error that says where it stands.
+number has a decimal point and no thousands separators. To learn from, a column holds
+numbers, truth values, dates or texts, which its whole decides; a column of several
+kinds is an error that says where one stands. `fuzzytree.columns` says more.
 """
 
 from __future__ import annotations
@@ -24,7 +25,15 @@ import re
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Generator,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+)
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, TypeAlias, TypeVar, cast
@@ -43,10 +52,25 @@ from fuzzytree.cells import (
     plain,
     unmasked,
 )
+from fuzzytree.columns import (
+    Contents,
+    categories_of,
+    coded,
+    is_missing_code,
+    placer,
+    positions,
+)
 from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, counted, number_array
 from fuzzytree.errors import MissingExtraError, TableError
 from fuzzytree.files import LIMIT, check_stream, reason
-from fuzzytree.model import LabelType, as_names, is_label, label_type_of
+from fuzzytree.model import (
+    DATE_UNIT,
+    LabelType,
+    Variable,
+    as_names,
+    is_label,
+    label_type_of,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -140,6 +164,9 @@ class Table(msgspec.Struct, frozen=True, eq=False):
         remarks: Columns, and what they have and is left out.
         label_type: What the names of classes stand for, if not text.
         weights: How many rows each row of a sample stands for; None of a whole table.
+        categories: Of columns of text or truth values, by name; their values are
+            positions among these.
+        dates: The columns of dates; their values are days since 1970-01-01 (UTC).
     """
 
     name: str
@@ -153,6 +180,8 @@ class Table(msgspec.Struct, frozen=True, eq=False):
     remarks: tuple[tuple[str, str], ...] = ()
     label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
     weights: FloatArray | None = None
+    categories: Mapping[str, tuple[str, ...]] = {}
+    dates: tuple[str, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -167,6 +196,7 @@ class Batch(msgspec.Struct, frozen=True, eq=False):
     Attributes:
         values: Shape (inputs, rows), in the order of the model's inputs.
         missing: How many cells are missing.
+        unknown: How many cells are no category of the model, by input; they are NaN.
         extras: How many columns the model does not need.
         piece: The rows as they came.
     """
@@ -175,6 +205,7 @@ class Batch(msgspec.Struct, frozen=True, eq=False):
     missing: int
     extras: int
     piece: TablePiece
+    unknown: Mapping[str, int] = {}
 
 
 class TableSource(msgspec.Struct, frozen=True, eq=False):
@@ -183,6 +214,7 @@ class TableSource(msgspec.Struct, frozen=True, eq=False):
     source: object
     columns: Sequence[str] | None = None
     delimiter: str | None = None
+    categorical: tuple[str, ...] = ()
 
 
 def table(
@@ -190,8 +222,9 @@ def table(
     *,
     columns: Sequence[str] | None = None,
     delimiter: str | None = None,
+    categorical: Sequence[str] = (),
 ) -> TableSource:
-    """Return a table for the functions that take one, with its columns or delimiter.
+    """Return a table for the functions that take one, with what it does not say.
 
     Args:
         source: A path, an open file, a pandas, polars or arrow table, or an array of
@@ -199,12 +232,13 @@ def table(
         columns: The names of an array's columns; x1, x2, ... unless given.
         delimiter: Of a CSV file; the only one of `,` `;` and tab in its first line
             unless given.
+        categorical: Columns to learn from whose cells are categories, numbers too.
 
     Example:
         >>> table(np.array([[1.5], [2.5]]), columns=["force"]).columns
         ['force']
     """
-    return TableSource(source, columns, delimiter)
+    return TableSource(source, columns, delimiter, tuple(as_names(categorical)))
 
 
 def path_of(source: object) -> str | None:
@@ -228,7 +262,8 @@ def read_table(
 ) -> Table:
     """Read a whole table with a class for each row.
 
-    Truth values become 0 and 1. Classes keep the text they have; whole numbers lose
+    Texts and truth values become positions among the categories of their column, and
+    dates days. Classes keep the text they have; whole numbers lose
     a fraction of zero, so that 1, 1.0 and "1" are one class.
 
     Args:
@@ -238,8 +273,9 @@ def read_table(
         name: What messages call the table; its path unless given.
 
     Raises:
-        TableError: If a column is absent, stands twice or holds text, if there is no
-            row, or if rows have different lengths; all such columns are named.
+        TableError: If a column is absent, stands twice or holds cells of several kinds,
+            if there is no row, or if rows have different lengths; all such columns are
+            named.
         TypeError: If the source is no table.
 
     Example:
@@ -257,7 +293,8 @@ class LearningPiece(msgspec.Struct, frozen=True, eq=False):
     Attributes:
         name: What messages call the table that they are of.
         rows: How many rows were read.
-        values: Those of them that have a class, shape (columns, rows).
+        values: The codes of those that have a class (see `fuzzytree.columns`), of
+            shape (columns, rows).
         codes: The number of the class of each.
     """
 
@@ -286,6 +323,10 @@ class LearningRows:
         unlabelled: How many of them were left out because they have no class.
         missing: How many cells of the others are missing.
         remarks: Columns, and what they have and is left out.
+        contents: What the cells of each column hold.
+        categorical: The columns whose cells are all categories.
+        first: By column and kind, where the first cell of the kind stands, and its
+            text.
     """
 
     def __init__(
@@ -319,6 +360,9 @@ class LearningRows:
             cells = target if isinstance(target, np.ndarray) else plain(target)
             self._codes = self.labels.add(*coded_classes(cells))
         self._counts: dict[int, frozenset[int]] = {}
+        self.contents: dict[str, Contents] = {}
+        self.categorical = frozenset(c.strip() for c in _categorical_of(source))
+        self.first: dict[str, dict[str, tuple[str, str]]] = {}
         self._progress = progress
         self._pieces = pieces(source, name=name)
 
@@ -326,31 +370,36 @@ class LearningRows:
         """Yield the rows piece by piece.
 
         Raises:
-            TableError: If a column is absent or holds text, when all rows were read.
+            TableError: If a column is absent.
         """
         begin = time.monotonic()
         first = next(self._pieces)
         self.name = self.name or first.name
         chosen = self._chosen(first)
         is_kept = np.array([k not in self._counts for k in chosen], bool)
-        names, total = [first.columns[k] for k in chosen], _Faults()
+        names = [first.columns[k] for k in chosen]
+        if self._chosen_by == "other parts have":
+            _refuse_absent(first, sorted(self.categorical), "")
 
         def read(
             piece: TablePiece,
-        ) -> tuple[TablePiece, FloatArray, _Faults, _Coded | None]:
-            numbers = _numbers_of(piece, chosen, names)
+        ) -> tuple[TablePiece, FloatArray, list[_Column], _Coded | None]:
+            numbers = _codes_of(piece, chosen, names, self.categorical)
             if self._codes is not None:
                 return piece, *numbers, None
             cells = piece.cells[piece.columns.index(self.target)]
             return piece, *numbers, coded_classes(cells)
 
         later = in_order(read, self._pieces)
-        for piece, values, faults, coded in itertools.chain([read(first)], later):
-            for name, (where, text, count) in faults.items():
-                where, text, before = total.get(name, (where, text, 0))
-                total[name] = (where, text, before + count)
-            if coded is not None:
-                codes = self.labels.add(*coded)
+        for piece, values, columns, labels in itertools.chain([read(first)], later):
+            for name, (contents, examples) in zip(names, columns, strict=True):
+                known = self.contents.setdefault(name, Contents())
+                self.contents[name] = known.merge(contents)
+                places = self.first.setdefault(name, {})
+                for kind, (row, text) in examples.items():
+                    places.setdefault(kind, (piece.where(row), text))
+            if labels is not None:
+                codes = self.labels.add(*labels)
             else:
                 codes = cast("IntArray", self._codes)[self.rows :][: piece.rows]
             for row in np.flatnonzero(~is_kept).tolist():
@@ -358,7 +407,7 @@ class LearningRows:
             self.rows += piece.rows
             if self._progress is not None:
                 self._progress(f"{piece.name}: {rate_text(self.rows, begin)}", 0.0)
-            if total or len(codes) != piece.rows:
+            if len(codes) != piece.rows:
                 continue
             has_class = codes >= 0
             if not is_kept.all():
@@ -366,13 +415,8 @@ class LearningRows:
             if not has_class.all():
                 values, codes = values[:, has_class], codes[has_class]
             self.unlabelled += piece.rows - len(codes)
-            self.missing += _missing_cells(values)
+            self.missing += sum(int(is_missing_code(row).sum()) for row in values)
             yield LearningPiece(piece.name, piece.rows, values, codes)
-        if total:
-            hint = " ".join(f"--ignore {_quoted(k)}" for k in _some(total))
-            raise TableError(
-                f"{_fault_text(total)}\n  leave columns out with ignore ({hint})"
-            )
 
     def refuse_empty(self) -> None:
         """Check what all rows show.
@@ -407,19 +451,30 @@ class LearningRows:
         """
         self.refuse_empty()
         codes = np.concatenate([part.codes for part in parts])
-        values = [part.values for part in parts]
-        positions, classes = self.labels.ordered()
-        return Table(
+        blocks = [part.values for part in parts]
+        values = blocks[0] if len(blocks) == 1 else np.hstack(blocks)
+        columns = columns_of(
             self.name,
             self.names or (),
-            values[0] if len(values) == 1 else np.hstack(values),
+            self.contents,
+            self.categorical,
+            values,
+            self.first,
+        )
+        places, classes = self.labels.ordered()
+        return Table(
+            self.name,
+            columns.names,
+            columns.placed(values),
             classes,
-            positions[codes],
+            places[codes],
             self.missing,
             self.unlabelled,
             self.target,
-            tuple(self.remarks),
+            (*self.remarks, *columns.remarks),
             self.labels.label_type() if self.target else self.labels.kind(),
+            categories=columns.categories,
+            dates=columns.dates,
         )
 
     def _chosen(self, first: TablePiece) -> list[int]:
@@ -463,6 +518,7 @@ def batches(
     trained: Sequence[str] = (),
     name: str | None = None,
     with_others: bool = False,
+    variables: Iterable[Variable] = (),
 ) -> Iterator[Batch]:
     """Yield the rows of a table for a model, files piece by piece.
 
@@ -478,6 +534,8 @@ def batches(
         name: As in `read_table`.
         with_others: Whether the pieces hold the other columns' cells as well; unless
             they do, a Parquet file's are not read and a frame's not converted.
+        variables: Those of the model, which say which inputs have categories, whose
+            cells become positions, and which have dates.
 
     Raises:
         TableError: If a column is absent, stands twice or holds text, or rows have
@@ -486,16 +544,20 @@ def batches(
     """
     inputs, trained = ([c.strip() for c in names] for names in (inputs, trained))
     _refuse_repeated("the model", inputs)
+    known = {one.name.strip(): one for one in variables}
+    categories = {name: one.categories for name, one in known.items() if one.categories}
+    dates = {name for name, one in known.items() if one.unit == DATE_UNIT}
     only = None if with_others else frozenset(inputs)
     chosen: list[int] | None = None
     for piece in pieces(source, name=name, only=only):
         if chosen is None:
             chosen = _needed_columns(piece, inputs, trained)
-        values, faults = _numbers_of(piece, chosen, inputs)
+        values, faults, unknown = _numbers_of(piece, chosen, inputs, categories, dates)
         if faults:
             raise TableError(_fault_text(faults))
         extras = len(piece.columns) - len(chosen)
-        yield Batch(values, _missing_cells(values), extras, piece)
+        missing = _missing_cells(values) - sum(unknown.values())
+        yield Batch(values, missing, extras, piece, unknown)
 
 
 def in_order(function: Callable[[S], T], items: Iterable[S]) -> Generator[T]:
@@ -537,6 +599,14 @@ def _until_failure(items: Iterable[S], failures: list[Exception]) -> Iterator[S]
         yield from items
     except Exception as error:  # raised in its turn
         failures.append(error)
+
+
+def _categorical_of(source: object) -> tuple[str, ...]:
+    """Return the columns that a table is said to have categories in."""
+    result: tuple[str, ...] = ()
+    while isinstance(source, TableSource):
+        result, source = result + source.categorical, source.source
+    return result
 
 
 def pieces(
@@ -713,27 +783,213 @@ def coded_classes(cells: Cells) -> _Coded:
     return codes, [*keys], "csv" if is_csv else label_type_of(labels) or "text"
 
 
-def _numbers_of(
-    piece: TablePiece, chosen: Sequence[int], names: Sequence[str]
-) -> tuple[FloatArray, _Faults]:
-    """Return columns of a piece as numbers by their names, and the cells of text."""
+class LearntColumns(msgspec.Struct, frozen=True):
+    """What the columns of a whole table are.
+
+    Attributes:
+        names: The columns to learn from.
+        kept: Their places among the columns that were read.
+        categories: Those of columns of text or truth values, by name.
+        dates: The columns of dates.
+        remarks: Columns that are left out, and why.
+    """
+
+    names: tuple[str, ...]
+    kept: tuple[int, ...]
+    categories: Mapping[str, tuple[str, ...]]
+    dates: tuple[str, ...]
+    remarks: tuple[tuple[str, str], ...]
+
+    def placed(self, values: FloatArray) -> FloatArray:
+        """Return the values of the columns, with positions in the place of codes.
+
+        `values` has shape (columns, rows), of all columns that were read.
+        """
+        if len(self.kept) < len(values):
+            values = values[[*self.kept]]
+        if not self.categories:
+            return values
+        rows = [
+            positions(row, self.categories[name]) if name in self.categories else row
+            for name, row in zip(self.names, values, strict=True)
+        ]
+        return np.array(rows).reshape(values.shape)
+
+
+def columns_of(
+    table: str,
+    names: Sequence[str],
+    contents: Mapping[str, Contents],
+    categorical: Collection[str],
+    values: FloatArray,
+    first: Mapping[str, Mapping[str, tuple[str, str]]] | None = None,
+) -> LearntColumns:
+    """Decide what the columns of a table are, now that all of it was read.
+
+    Args:
+        table: What messages call it.
+        names: The columns that were read.
+        contents: What their cells hold.
+        categorical: The columns whose cells are all categories.
+        values: The codes of their cells, of shape (columns, rows), or of a sample.
+        first: Where the first cell of each kind stands, and its text, if known.
+
+    Raises:
+        TableError: If cells of a column do not go together; all such columns are named.
+    """
+    mixed: dict[str, str] = {}
+    kept: list[int] = []
+    remarks: list[tuple[str, str]] = []
+    categories: dict[str, tuple[str, ...]] = {}
+    dates: list[str] = []
+    for place, name in enumerate(names):
+        held = contents.get(name, Contents())
+        is_declared = name in categorical
+        kind = held.kind(is_categorical=is_declared)
+        if not held.cells and len(values[0]):
+            remarks.append((name, "no value in any row; it is left out"))
+            continue
+        if kind is None:
+            mixed[name] = _mixed_text(table, name, held, (first or {}).get(name, {}))
+        elif kind == "text" and held.is_identifier(is_categorical=is_declared):
+            count = "more than 10,000" if held.texts is None else len(held.texts)
+            text = (
+                f"{count} different texts in {held.text:,} rows, as an identifier has"
+            )
+            hint = f"; --categorical {_quoted(name)} keeps it" if held.texts else ""
+            remarks.append((name, f"{text}; it is left out{hint}"))
+            continue
+        elif kind in ("text", "boolean"):
+            numbers = np.unique(values[place]) if held.number else ()
+            categories[name] = categories_of(held, [*map(float, numbers)])
+        elif kind == "date":
+            dates.append(name)
+        kept.append(place)
+    if mixed:
+        shown, others = [*mixed.values()], len(mixed) - _MOST_NAMES
+        if others > 0:
+            shown[_MOST_NAMES:] = [f"and {counted(others, 'column')} more hold text"]
+        hints = (
+            " ".join(f"--{option} {_quoted(k)}" for k in _some(mixed))
+            for option in ("ignore", "categorical")
+        )
+        text = "leave columns out with ignore ({}), or take all their cells as "
+        text = text + "categories with categorical ({})"
+        raise TableError("\n".join(shown) + "\n  " + text.format(*hints))
+    chosen = tuple(names[place] for place in kept)
+    if not chosen:
+        raise TableError(f"{table} has no column to learn from")
+    return LearntColumns(chosen, tuple(kept), categories, tuple(dates), tuple(remarks))
+
+
+def _mixed_text(
+    table: str, name: str, held: Contents, first: Mapping[str, tuple[str, str]]
+) -> str:
+    """Return that the cells of a column do not go together."""
+    counts = {
+        "number": held.number,
+        "truth value": held.boolean,
+        "date": held.date,
+        "text": held.text,
+        "other cell": held.other,
+    }
+    kinds = sorted((count, kind) for kind, count in counts.items() if count)
+    (count, kind), *others = kinds
+    example = (held.texts or ("",))[0] if kind == "text" else ""
+    where, example = first.get(
+        {"truth value": "boolean", "other cell": "other"}.get(kind, kind),
+        (table, example),
+    )
+    among = " and ".join(f"{n:,} {one}{'s' * (n > 1)}" for n, one in others)
+    text = "text where a number is needed" if kind == "text" else f"a {kind}"
+    share = f" ({count:,} among {among})" if among else _more(count)
+    return (
+        f"{where}: column {name!r} holds {text}: "
+        f"{_shortened(example)!r}{_decimal_hint(example)}{share}"
+    )
+
+
+_Column: TypeAlias = tuple[Contents, dict[str, tuple[int, str]]]
+
+
+def _codes_of(
+    piece: TablePiece,
+    chosen: Sequence[int],
+    names: Sequence[str],
+    categorical: Collection[str],
+) -> tuple[FloatArray, list[_Column]]:
+    """Return the codes of columns, and what each holds, with the first of each kind."""
+    columns = [piece.cells[index] for index in chosen]
+    values: FloatArray | None = None
+    if not categorical:
+        values = _all_numbers(piece, chosen)
+    if values is not None:
+        is_none = np.isnan(values)
+        if is_none.any():
+            values = np.where(is_none, math.nan, values)
+        counts = (piece.rows - is_none.sum(axis=1)).tolist()
+        return values, [(Contents(number=count), {}) for count in counts]
+    values, found = np.empty((len(columns), piece.rows)), list[_Column]()
+    for row, (cells, name) in enumerate(zip(columns, names, strict=True)):
+        if isinstance(cells, np.ndarray) and cells.dtype.kind != "M":
+            cells = numbers_only(cells, f"{piece.name}: column {name!r}")
+        is_csv = len(cells) and not isinstance(cells, np.ndarray | Sequence)
+        if is_csv and name not in categorical:
+            parsed = _parsed([cast("pa.ChunkedArray", cells)])
+            cells = cells if parsed is None else parsed
+        values[row], contents, first = coded(cells, is_categorical=name in categorical)
+        examples = {kind: (place, str(cells[place])) for kind, place in first.items()}
+        found.append((contents, examples))
+    return values, found
+
+
+def _all_numbers(piece: TablePiece, chosen: Sequence[int]) -> FloatArray | None:
+    """Return columns that are all of numbers at once, None if there is another one."""
     if piece.whole is not None:
         is_all = list(chosen) == list(range(len(piece.columns)))
-        return piece.whole if is_all else piece.whole[list(chosen)], {}
+        return piece.whole if is_all else piece.whole[list(chosen)]
     columns = [piece.cells[index] for index in chosen]
     is_csv = not any(isinstance(cells, np.ndarray | Sequence) for cells in columns)
-    if columns and piece.rows and is_csv:
-        parsed = _parsed(columns)
-        if parsed is not None:
-            return parsed.reshape(len(columns), piece.rows), {}
+    parsed = _parsed(columns) if columns and piece.rows and is_csv else None
+    return None if parsed is None else parsed.reshape(len(columns), piece.rows)
+
+
+def _numbers_of(
+    piece: TablePiece,
+    chosen: Sequence[int],
+    names: Sequence[str],
+    categories: Mapping[str, Sequence[str]],
+    dates: Collection[str],
+) -> tuple[FloatArray, _Faults, dict[str, int]]:
+    """Return columns of a piece as numbers, the cells of text, and unknown categories.
+
+    Cells of a column with categories become their positions.
+    """
+    numbers = None if categories else _all_numbers(piece, chosen)
+    if numbers is not None:
+        return numbers, {}, {}
+    columns = [piece.cells[index] for index in chosen]
+    unknown: dict[str, int] = {}
     values, faults = np.empty((len(columns), piece.rows)), _Faults()
     for row, (cells, name) in enumerate(zip(columns, names, strict=True)):
+        if name in categories:
+            indices, distinct = distinct_values(cells)
+            found = [*map(placer(categories[name]), distinct)]
+            is_new = np.array([one is None for one in found], np.bool_)
+            places = np.array([math.nan if one is None else one for one in found])
+            values[row] = places[indices]
+            unknown[name] = int(np.count_nonzero(is_new[indices]))
+            continue
+        if name in dates:
+            values[row], contents, _ = coded(cells)
+            if contents.kind() in ("date", "number"):
+                continue
         if isinstance(cells, np.ndarray):
             cells = numbers_only(cells, f"{piece.name}: column {name!r}")
         values[row], bad = _numbers(cells)
         if bad:
             faults[name] = piece.where(bad[0]), str(cells[bad[0]]), len(bad)
-    return values, faults
+    return values, faults, {name: n for name, n in unknown.items() if n}
 
 
 def _fault_text(faults: _Faults) -> str:
@@ -1264,8 +1520,8 @@ def _frame_piece(source: object, name: str, only: Only = None) -> TablePiece:
             cells.append(())
             continue
         series = frame.get_column(there[title])
-        is_number = series.dtype.is_numeric()
-        cells.append(series.to_numpy() if is_number else series.to_list())
+        is_array = series.dtype.is_numeric() or series.dtype == nw.Datetime
+        cells.append(series.to_numpy() if is_array else series.to_list())
     return TablePiece(
         name, columns, tuple(cells), len(frame), _row_names(name), written
     )

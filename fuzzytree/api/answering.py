@@ -27,6 +27,7 @@ from fuzzytree.model import (
     RuleBase,
     Runtime,
     SystemRun,
+    Variable,
     kind_of,
 )
 from fuzzytree.runtimes import (
@@ -160,12 +161,14 @@ class Answering(msgspec.Struct, frozen=True):
         trained: The columns of the table that it was learnt from, if any.
         answer: Predicts for values of shape (inputs, rows).
         is_parallel: Whether several threads may call it at the same time.
+        variables: Those of the model, which say what cells mean.
     """
 
     inputs: tuple[str, ...]
     trained: tuple[str, ...]
     answer: Callable[[FloatArray], Predictions | Outputs]
     is_parallel: bool = False
+    variables: tuple[Variable, ...] = ()
 
     def __call__(
         self,
@@ -201,6 +204,7 @@ class Answering(msgspec.Struct, frozen=True):
             trained=self.trained,
             name=name,
             with_others=with_others,
+            variables=self.variables,
         )
         return in_order(answered, parts)
 
@@ -243,7 +247,9 @@ def prepare_answering(
             with_probabilities=with_probabilities,
         )
 
-    return Answering(model.inputs, model.columns, answer, used.is_reentrant)
+    return Answering(
+        model.inputs, model.columns, answer, used.is_reentrant, model.variables
+    )
 
 
 def _rated(model: Document | OnnxModel) -> Document | OnnxModel:

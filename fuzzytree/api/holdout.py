@@ -158,6 +158,7 @@ def accuracy(
             columns=table.columns,
             classes=classes,
             settings=_of_fold(settings, None if is_nested else report, classes),
+            categories=table.categories,
         )
         predicted = _answered(learnt.tree, table, test)
         right = predicted == table.codes[test]

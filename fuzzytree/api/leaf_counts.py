@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.checking import as_model
+from fuzzytree.columns import positions
 from fuzzytree.errors import ReadError
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning import (
@@ -101,8 +102,14 @@ class LeafCounts:
         )
         execute, missing = baseline().load(self.tree), len(self.tree.leaves) + 1
 
+        inputs = [one for one in self.tree.variables if not one.parts]
+
         def predict(piece: LearningPiece) -> tuple[IntArray, IntArray, int]:
-            outcome = execute(np.ascontiguousarray(piece.values))
+            rows = [
+                positions(row, one.categories) if one.categories else row
+                for one, row in zip(inputs, piece.values, strict=True)
+            ]
+            outcome = execute(np.array(rows).reshape(piece.values.shape))
             is_missing = outcome.status == Status.MISSING
             ends = np.where(is_missing, missing, outcome.rule).astype(np.int64)
             ties = int(np.count_nonzero(outcome.status == Status.TIE))

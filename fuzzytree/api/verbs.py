@@ -34,6 +34,7 @@ from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
 from fuzzytree.files import check_stream, read_bounded, reason, write_atomically
 from fuzzytree.model import (
+    DATE_UNIT,
     Agreement,
     CheckSettings,
     Conjunction,
@@ -168,9 +169,10 @@ def learn_table(
         table.codes,
         columns=table.columns,
         classes=table.classes,
-        units=units,
+        units={**units, **dict.fromkeys(table.dates, DATE_UNIT)},
         name=name,
         settings=settings,
+        categories=table.categories,
         progress=progress,
     )
     tree = with_label_type(learnt.tree, table.label_type)
@@ -307,6 +309,7 @@ def _rows(
             trained=() if is_system else model.inputs,
             name=name,
             with_others=with_others,
+            variables=model.variables,
         )
     ]
     return _values(result), result
@@ -742,7 +745,9 @@ def diff(
     source = _source_of(data, name)
     rows = None
     if data is not None:
-        result = [*batches(data, auditing.all_inputs(first, second), name=name)]
+        variables = (*first.variables, *second.variables)
+        inputs = auditing.all_inputs(first, second)
+        result = [*batches(data, inputs, name=name, variables=variables)]
         rows = auditing.AuditRows(result[0].piece.name, _values(result))
     return auditing.difference(
         first,

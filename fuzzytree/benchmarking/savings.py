@@ -318,7 +318,9 @@ def _calls(
 
 def _reading(table: object, model: Model) -> Call:
     def read() -> int:
-        pieces = batches(table, model.inputs, trained=model.columns)
+        pieces = batches(
+            table, model.inputs, trained=model.columns, variables=model.variables
+        )
         return sum(batch.values.shape[1] for batch in pieces)
 
     return read

@@ -14,6 +14,7 @@ from fuzzytree.cli.console import (
     ResultOptions,
     answer_json,
     argument,
+    categorical_option,
     delimiter_option,
     ignore_option,
     option,
@@ -49,6 +50,7 @@ class CollectOptions(ResultOptions):
         "Columns to learn from, separated by commas; all of the first PART by default.",
     )
     ignore: Sequence[str] = ignore_option
+    categorical: Sequence[str] = categorical_option
     rows_per_class: int | None = option(
         "--rows-per-class",
         "Largest number of rows per class that the learner keeps.",
@@ -56,8 +58,8 @@ class CollectOptions(ResultOptions):
     )
     missing: str | None = option(
         "--missing",
-        "Rows with missing values: drop them, or refuse the part.",
-        choices=["drop", "refuse"],
+        "Rows with missing values: take them, or refuse the part.",
+        choices=["learn", "drop", "refuse"],
     )
     delimiter: str | None = delimiter_option
 
@@ -98,7 +100,7 @@ def command(options: CollectOptions) -> None:
     rows = f"{learner.rows:,} rows"
     said = f"{facts['columns']} columns, {facts['classes']} classes, {seconds:.2f} s"
     reasons = {
-        "dropped": "left out: a value is missing or not finite",
+        "dropped": "with a value that is missing or not finite",
         "rows_without_class": "left out: they have no class",
         "ties": "decided by the order of the leaves",
         "no_rule": "with no rule fired",
@@ -131,6 +133,7 @@ def _learner(options: CollectOptions) -> Learner:
         options.target,
         columns=None if options.columns is None else options.columns.split(","),
         ignore=options.ignore,
+        categorical=options.categorical,
         settings=LearningSettings(**chosen),  # type: ignore[arg-type]  # click checked
     )
 
@@ -139,7 +142,7 @@ def _counts(options: CollectOptions) -> LeafCounts:
     """Return what counts for a model, which has its columns and settings."""
     from fuzzytree.api import LeafCounts
 
-    for name in ("columns", "ignore", "rows_per_class", "missing"):
+    for name in ("columns", "ignore", "categorical", "rows_per_class", "missing"):
         if getattr(options, name):
             raise click.UsageError(
                 f"--{name.replace('_', '-')}: --for counts what the model needs"

@@ -130,6 +130,11 @@ delimiter_option = option(
 
 ignore_option = several("--ignore COLUMN", "Column that is no input (repeat).")
 
+categorical_option = several(
+    "--categorical COLUMN",
+    "Column whose cells are all categories, numbers too (repeat).",
+)
+
 allow_loss_option = flag(
     "--allow-loss",
     "Read a file that a model cannot represent exactly, with the nearest values.",
@@ -219,14 +224,16 @@ def answer_bytes(content: bytes) -> None:
     sys.stdout.buffer.flush()
 
 
-def table_source(name: str | None, delimiter: str | None = None) -> object:
+def table_source(
+    name: str | None, delimiter: str | None = None, categorical: Sequence[str] = ()
+) -> object:
     """Return where to read a table: behind `-` is standard input."""
     found = standard_input() if name == "-" else name
-    if delimiter is None:
+    if delimiter is None and not categorical:
         return found
     from fuzzytree.tables import table
 
-    return table(found, delimiter=delimiter)
+    return table(found, delimiter=delimiter, categorical=categorical)
 
 
 def standard_input() -> BinaryIO:

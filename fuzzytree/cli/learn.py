@@ -17,6 +17,7 @@ from fuzzytree.cli.console import (
     answer_bytes,
     answer_json,
     argument,
+    categorical_option,
     delimiter_option,
     flag,
     ignore_option,
@@ -64,6 +65,7 @@ class LearnOptions(RepresentationOptions):
         "--name TEXT", "Name of the tree; the name of TABLE by default."
     )
     ignore: Sequence[str] = ignore_option
+    categorical: Sequence[str] = categorical_option
     units: Sequence[str] = several("--unit COLUMN=UNIT", "Unit of a column (repeat).")
     no_test: bool = flag(
         "--no-test", "Learn without measuring the cross-validated accuracy."
@@ -128,8 +130,9 @@ class LearnOptions(RepresentationOptions):
     )
     missing: Any = option(
         "--missing",
-        "Rows with missing values: drop them, or refuse the table.",
-        choices=["drop", "refuse"],
+        "Missing values: learn what stands for them, drop the rows, or refuse the "
+        "table.",
+        choices=["learn", "drop", "refuse"],
     )
 
 
@@ -306,7 +309,7 @@ def _read(
     if options.target is None:
         raise click.UsageError("name the column of the classes with --target")
     return read_or_collect(
-        table_source(options.tables[0], options.delimiter),
+        table_source(options.tables[0], options.delimiter, options.categorical),
         target=options.target,
         ignore=options.ignore,
         settings=settings,
@@ -486,7 +489,11 @@ def _report_rows(
     rows: list[tuple[str, str, str]] = []
     if report.rows_dropped:
         text = counted(report.rows_dropped, "row")
-        rows.append(("dropped", text, "a value is missing or not finite"))
+        rows.append(("dropped", text, "a value or the class is missing"))
+    if report.rows_filled:
+        text = counted(report.rows_filled, "row")
+        why = "a value is missing; what stands for it is part of the model"
+        rows.append(("filled", text, why))
     if report.rows_sampled < report.rows:
         text = counted(report.rows_sampled, "row")
         used = "for patterns, combinations, sets and the support of leaves"

@@ -8,7 +8,7 @@ import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
@@ -402,6 +402,7 @@ class _Tally:
         self.classes: Counter[str] = Counter()
         self.spans: dict[str, tuple[float, float]] = {}
         self.statuses: Counter[int] = Counter()
+        self.unknown: Counter[str] = Counter()
 
     def add(self, batch: Batch, answers: Predictions | Outputs) -> None:
         """Take the answers to a piece."""
@@ -410,6 +411,7 @@ class _Tally:
 
         self.rows += len(answers)
         self.cells += batch.missing
+        self.unknown.update(batch.unknown)
         self.extras = batch.extras
         self.remarks = trimmed(batch.piece)
         if isinstance(answers, Outputs):
@@ -420,6 +422,16 @@ class _Tally:
         else:
             self.classes.update(answers.class_counts())
         self.statuses.update({status: answers.count(status) for status in range(4)})
+
+    def _unusual_cells(self) -> Iterator[tuple[str, str, str]]:
+        """Yield what was missing or unknown in the inputs."""
+        from fuzzytree.report import counted
+
+        if self.cells:
+            yield "missing", counted(self.cells, "cell"), "in the inputs"
+        for name, count in self.unknown.items():
+            why = "no category of the model; answered like a missing one"
+            yield "unknown", f"{counted(count, 'cell')} of {name}", why
 
     def report(self, output: str, *, quiet: bool) -> None:
         """Report on stderr what was predicted and what was unusual."""
@@ -442,6 +454,7 @@ class _Tally:
         say_rows(
             ("predicted", counted(self.rows, "row"), ", ".join(counts)),
             ("status", "; ".join(status), ""),
+            *self._unusual_cells(),
             *(("remark", name, f"has {text}") for name, text in self.remarks),
             *([("ignored", counted(self.extras, "column"), "")] if self.extras else []),
             *([("wrote", output, "")] if output != "-" else []),

@@ -23,7 +23,9 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         mode: `default` or `paper`.
         rows: Rows that were learnt from.
-        rows_dropped: Rows left out: a value or the class is missing or not finite.
+        rows_dropped: Rows left out: the class is missing, or in paper mode a value is
+            missing or not finite.
+        rows_filled: Rows with a missing value, which a stand-in took the place of.
         rows_sampled: Rows kept for clusters, combinations and window counts.
         classes_without_rows: Classes that nothing was learnt about.
         features_ignored: Columns left out: constant, or its range overflows.
@@ -53,6 +55,7 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
     rows: int
     rows_dropped: int
     rows_sampled: int
+    rows_filled: int = 0
     classes_without_rows: tuple[str, ...]
     features_ignored: tuple[str, ...]
     patterns: dict[str, int]
@@ -104,7 +107,8 @@ def _counted(report: LearningReport, name: str, text: str) -> str:
 
 
 _TABLE = {
-    "rows_dropped": "rows dropped, a value is missing or not finite",
+    "rows_dropped": "rows dropped, a value or the class is missing",
+    "rows_filled": "rows with a missing value, which a stand-in took the place of",
     "patterns_refused": "patterns refused, too few rows",
     "single_rows": "patterns of one row",
     "inseparable": "patterns of different classes that nothing separates",
@@ -156,7 +160,9 @@ def remarks(table: Table, ignoring: Callable[[str], str]) -> Iterator[tuple[str,
         text = f"{classes} classes in {rows} rows, {rows / classes:.1f} rows for each"
         yield table.target or "the target", text
     for name, values in zip(table.columns, table.values, strict=True):
-        if _is_identifier(name, values):
+        if name in table.categories:
+            yield from _rare(name, values, table.categories[name])
+        elif _is_identifier(name, values):
             text = "a different whole number in each row, as an identifier has"
             yield name, f"{text}; {ignoring(name)} leaves it out"
 
@@ -181,8 +187,25 @@ def refuse_measurements(
         )
 
 
+def _rare(
+    name: str, values: FloatArray, categories: Sequence[str]
+) -> Iterator[tuple[str, str]]:
+    """Yield a remark on categories that occur once, of which little can be learnt."""
+    known = values[np.isfinite(values)].astype(np.int64)
+    single = np.flatnonzero(np.bincount(known, minlength=len(categories)) == 1)
+    if len(single):
+        text = (
+            "a category that occurs once"
+            if len(single) == 1
+            else (f"{len(single)} categories that occur once, such as")
+        )
+        yield name, f"{text}: {categories[single[0]]}"
+
+
 def _is_identifier(name: str, values: FloatArray) -> bool:
     """Return whether a column numbers the rows, or has the name of an identifier."""
+    if not np.isfinite(values).all():
+        return False
     low, high = float(values.min()), float(values.max())
     is_run = high - low == len(values) - 1 and len(values) >= _FEW_ROWS
     if not (is_run or _ID.fullmatch(name)) or not math.isfinite(high - low):

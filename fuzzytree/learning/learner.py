@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import msgspec
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from fuzzytree.cells import numbers_only, unmasked
 from fuzzytree.errors import LearningError
 from fuzzytree.learning.assembly import AssembledTree, TermNames, assembled
+from fuzzytree.learning.filling import codes_of_positions, described, filled
 from fuzzytree.learning.findings import LearningReport
 from fuzzytree.learning.growing import GrownTree
 from fuzzytree.learning.patterns import usable_features
@@ -24,6 +25,11 @@ from fuzzytree.learning.validation import ChosenTree, chosen_tree
 from fuzzytree.model import FuzzyTree, text_fault
 
 Progress = Callable[[str, float], None]
+
+_INCOMPLETE = (
+    "cannot learn from a table without complete rows: all {} hold a missing or "
+    "infinite value or no class"
+)
 
 
 class Learnt(msgspec.Struct, frozen=True):
@@ -42,12 +48,14 @@ def learn_arrays(
     units: Mapping[str, str] | None = None,
     name: str = "tree",
     settings: LearningSettings | None = None,
+    categories: Mapping[str, tuple[str, ...]] | None = None,
     progress: Progress | None = None,
 ) -> Learnt:
     """Learn a fuzzy decision tree from a table of numbers.
 
     Args:
         values: Shape (rows, columns), any real type and memory order; read in blocks.
+            NaN and infinity are missing.
         labels: The class of each row: names out of `classes`, or their positions.
             None, NaN, an empty name or a negative position drops the row.
         columns: Names of the columns.
@@ -55,6 +63,7 @@ def learn_arrays(
         units: By column, for people.
         name: Of the tree.
         settings: How to learn.
+        categories: Of columns of text, by name; their values are positions.
         progress: Called with what is being done and its share done, 0 to 1.
 
     Raises:
@@ -74,6 +83,7 @@ def learn_arrays(
         units=units or {},
         name=name,
         settings=settings or LearningSettings(),
+        categories=categories or {},
     )
     learner.partial_fit(values, labels, progress=progress)
     return learner.finish(progress=progress)
@@ -89,6 +99,7 @@ class ArrayLearner:
         units: By column.
         name: Of the tree.
         settings: How to learn.
+        categories: By column; none of a column of numbers.
 
     Example:
         >>> learner = ArrayLearner(columns=["cm"], classes=["small", "big"])
@@ -103,6 +114,9 @@ class ArrayLearner:
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     name: str = "tree"
     settings: LearningSettings = field(default_factory=LearningSettings)
+    categories: Mapping[str, tuple[str, ...]] = field(
+        default_factory=dict[str, tuple[str, ...]]
+    )
     statistics: Statistics = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -134,6 +148,10 @@ class ArrayLearner:
         if progress is not None:
             progress("counting", 0.0)
         before = self.statistics.dropped
+        if self.categories:
+            values = codes_of_positions(
+                values.astype(np.float64), self.columns, self.categories
+            )
         self.statistics.update(values, codes)
         dropped = self.statistics.dropped - before
         if dropped and self.settings.missing == "refuse":
@@ -150,9 +168,18 @@ class ArrayLearner:
         Raises:
             LearningError: If there is no row, one class, or no column that varies.
         """
-        check_rows(self.statistics, self.classes)
-        sample = self.statistics.sample()
-        moments = self.statistics.moments(sample.units)
+        drops = self.settings.drops_missing
+        check_rows(self.statistics, self.classes, self.statistics.dropped)
+        if self.settings.mode == "paper":
+            _refuse_texts(self.categories)
+        categories = [self.categories.get(name, ()) for name in self.columns]
+        table = filled(self.statistics, categories, drops=drops)
+        statistics, dropped = table.statistics, self.statistics.dropped
+        if dropped and not (drops or np.isfinite(table.stand_ins).any()):
+            raise LearningError(_INCOMPLETE.format(dropped))
+        check_rows(statistics, self.classes, dropped)
+        sample = statistics.sample()
+        moments = statistics.moments(sample.units)
         _check_columns(moments)
         costs = np.array([self.settings.costs.get(c, 1.0) for c in self.columns])
         choice = chosen_tree(
@@ -164,7 +191,7 @@ class ArrayLearner:
         made = assembled(
             choice.grown.sketch,
             choice.patterns,
-            self.statistics,
+            statistics,
             names,
             points=self.settings.points,
             separate_sides=self.settings.separate_sides,
@@ -173,6 +200,8 @@ class ArrayLearner:
             progress("fitting sets", 1.0)
         places = {name: place for place, name in enumerate(self.columns)}
         tree = with_probabilities(made.tree, sample, moments.counts, places)
+        if self.settings.mode != "paper":
+            tree = described(tree, self.columns, table, self.statistics)
         return Learnt(tree, self._report(moments, sample, choice, made))
 
     def _report(
@@ -181,10 +210,14 @@ class ArrayLearner:
         patterns, grown = choice.patterns, choice.grown
         usable = set(usable_features(moments).tolist())
         per_class = np.bincount(patterns.labels, minlength=len(self.classes))
+        drops, dropped = self.settings.drops_missing, self.statistics.dropped
+        rows = self.statistics.counts().sum() - (dropped if drops else 0)
+        rows += self.statistics.unlabelled if drops else 0
         return LearningReport(
             mode=self.settings.mode,
-            rows=int(moments.counts.sum()),
-            rows_dropped=self.statistics.dropped,
+            rows=int(rows),
+            rows_dropped=dropped if drops else self.statistics.unlabelled,
+            rows_filled=0 if drops else dropped - self.statistics.unlabelled,
             rows_sampled=len(sample.rows),
             classes_without_rows=tuple(
                 c for c, n in zip(self.classes, moments.counts, strict=True) if n == 0
@@ -278,15 +311,27 @@ def _codes(
     return codes
 
 
-def check_rows(statistics: Statistics, classes: Sequence[str]) -> None:
-    """Raise a LearningError if there are too few rows to learn from."""
-    counts, dropped = statistics.counts(), statistics.dropped
+def _refuse_texts(columns: Iterable[str]) -> None:
+    """Raise a LearningError if there are columns of text."""
+    names = ", ".join(map(repr, columns))
+    if names:
+        raise LearningError(
+            f"the paper's algorithm learns from numbers alone, and not from {names}\n"
+            "  leave these columns out with ignore, or learn in default mode"
+        )
+
+
+def check_rows(
+    statistics: Statistics, classes: Sequence[str], dropped: int = 0
+) -> None:
+    """Raise a LearningError if there are too few rows to learn from.
+
+    `dropped` says how many are incomplete or have no class.
+    """
+    counts = statistics.counts()
     rows = int(counts.sum())
     if rows == 0 and dropped:
-        raise LearningError(
-            f"cannot learn from a table without complete rows: all {dropped} hold a "
-            "missing or infinite value or no class"
-        )
+        raise LearningError(_INCOMPLETE.format(dropped))
     if rows == 0:
         raise LearningError("cannot learn from a table without rows")
     if rows == 1:

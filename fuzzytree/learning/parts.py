@@ -18,24 +18,28 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Final
 
 import msgspec
 import numpy as np
 
+from fuzzytree.columns import Contents
 from fuzzytree.errors import LearningError, ReadError
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning.findings import refuse_measurements
 from fuzzytree.learning.learner import ArrayLearner, Learnt, check_rows
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Statistics
-from fuzzytree.model import FuzzyTree, as_names, with_label_type
+from fuzzytree.model import DATE_UNIT, FuzzyTree, as_names, with_label_type
 from fuzzytree.tables import (
     THREADS,
     ClassLabels,
     LearningPiece,
     LearningRows,
+    LearntColumns,
     Table,
+    TableSource,
+    columns_of,
 )
 
 if TYPE_CHECKING:
@@ -43,7 +47,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, float], None]
 
-MAGIC: Final = "fuzzytree state 1"
+MAGIC: Final = "fuzzytree state 2"
 """The kind and the version of a state's file."""
 
 COUNTS_MAGIC: Final = "fuzzytree leaf counts 1"
@@ -75,8 +79,10 @@ class StateHeader(msgspec.Struct, forbid_unknown_fields=True):
         unlabelled: Rows that were left out as they have no class.
         parts: The digests of the states that were merged.
         rows_per_class: How many rows of a class the sample keeps.
-        dropped: Rows that were left out as a value is missing.
+        dropped: Rows in which a value is missing.
         missing: Cells without a value.
+        contents: What the cells of each column hold.
+        categorical: The columns whose cells are all categories.
         model: The fingerprint of the tree whose leaves are counted; empty for none.
         ties: Rows that more than one leaf claims.
         digest: Of everything else.
@@ -93,6 +99,8 @@ class StateHeader(msgspec.Struct, forbid_unknown_fields=True):
     rows_per_class: int = 0
     dropped: int = 0
     missing: int = 0
+    contents: list[Contents] = []
+    categorical: list[str] = []
     model: str = ""
     ties: int = 0
     digest: str = ""
@@ -117,6 +125,7 @@ class Learner:
         columns: The columns to learn from, in the order in which the tree has them;
             all columns of the first part, in its order, if None.
         ignore: Columns that are no input.
+        categorical: Columns whose cells are categories, numbers too.
         units: The unit of a column, by name.
         name: The name of the tree.
         settings: How to learn.
@@ -138,6 +147,7 @@ class Learner:
         *,
         columns: Sequence[str] | None = None,
         ignore: Sequence[str] = (),
+        categorical: Sequence[str] = (),
         units: Mapping[str, str] | None = None,
         name: str = "tree",
         settings: LearningSettings | None = None,
@@ -145,12 +155,15 @@ class Learner:
         self.target = target.strip()
         self.columns = None if columns is None else tuple(as_names(columns))
         self.ignore = tuple(column.strip() for column in as_names(ignore))
+        self.categorical = frozenset(c.strip() for c in as_names(categorical))
         self.units = dict(units or {})
         self.name = name
         self.settings = settings or LearningSettings()
         self.unlabelled = self.missing = 0
         self.remarks: tuple[tuple[str, str], ...] = ()
         self._labels = ClassLabels()
+        self._contents: dict[str, Contents] = {}
+        self._first: dict[str, dict[str, tuple[str, str]]] = {}
         self._parts: frozenset[str] = frozenset()
         self._statistics: Statistics | None = None
 
@@ -162,12 +175,12 @@ class Learner:
 
     @property
     def rows(self) -> int:
-        """How many rows were collected that have a class and all values."""
+        """How many rows were collected that have a class."""
         return 0 if self._statistics is None else int(self._statistics.counts().sum())
 
     @property
     def dropped(self) -> int:
-        """How many rows were left out as a value is missing or not finite."""
+        """In how many rows a value is missing or not finite."""
         return 0 if self._statistics is None else self._statistics.dropped
 
     def update(
@@ -189,13 +202,13 @@ class Learner:
                 has the same bits for any number.
 
         Raises:
-            TableError: If a column is absent or holds text, or a file cannot be read;
-                nothing of the part is taken then.
+            TableError: If a column is absent, or a file cannot be read; nothing of the
+                part is taken then.
             LearningError: If a value is missing, and `missing` is `refuse`.
         """
         begun = self._empty()
         rows = LearningRows(
-            table,
+            TableSource(table, categorical=tuple(self.categorical)),
             target=self.target,
             ignore=self.ignore,
             name=name,
@@ -218,6 +231,9 @@ class Learner:
         """
         if not repeated:
             refuse_repeated(self._parts, other._parts)
+        declared = [sorted(one.categorical) for one in (self, other)]
+        if not (self._contents and other._contents):  # an empty one declares nothing
+            declared = [max(declared)] * 2
         for what, mine, others in (
             ("target", [self.target], [other.target]),
             ("columns", self.columns or other.columns, other.columns or self.columns),
@@ -226,11 +242,24 @@ class Learner:
                 [str(self.settings.rows_per_class)],
                 [str(other.settings.rows_per_class)],
             ),
+            (
+                "set of categorical columns",
+                [", ".join(declared[0]) or "none"],
+                [", ".join(declared[1]) or "none"],
+            ),
         ):
             if mine != others:
                 raise ValueError(_difference(what, mine or (), others or ()))
         result = self._empty()
         result.columns = self.columns or other.columns
+        result.categorical = frozenset(declared[0])
+        result._first = self._first | other._first
+        result._contents = {
+            name: self._contents.get(name, Contents()).merge(
+                other._contents.get(name, Contents())
+            )
+            for name in result.columns or ()
+        }
         result.unlabelled = self.unlabelled + other.unlabelled
         result.missing = self.missing + other.missing
         result.remarks = self.remarks or other.remarks
@@ -261,15 +290,20 @@ class Learner:
             LearningError: As `learn`.
         """
         statistics, order = self._joined()
-        columns = cast("tuple[str, ...]", self.columns)
+        if not self.rows:
+            check_rows(statistics, order)
+        found = self._learnt_columns(statistics)
         for column in self.units:
-            if column not in columns:
-                known = ", ".join(columns)
+            if column not in found.names:
+                known = ", ".join(found.names)
                 raise LearningError(
                     f"a unit for {column!r}, which is no column; it has {known}"
                 )
-        learner = ArrayLearner(columns, order, self.units, self.name, self.settings)
-        learner.statistics = statistics
+        units = {**self.units, **dict.fromkeys(found.dates, DATE_UNIT)}
+        learner = ArrayLearner(
+            found.names, order, units, self.name, self.settings, found.categories
+        )
+        learner.statistics = statistics.of_columns(found.kept)
         learnt = learner.finish(progress=progress)
         tree = with_label_type(learnt.tree, self._labels.label_type())
         return msgspec.structs.replace(learnt, tree=tree)
@@ -286,20 +320,33 @@ class Learner:
         statistics, classes = self._joined()
         if not self.rows:
             check_rows(statistics, classes)
-        sample = statistics.sample()
+        sample, columns = statistics.sample(), self._learnt_columns(statistics)
         kept = np.bincount(sample.codes, minlength=len(classes))
         weights = statistics.counts() / np.maximum(kept, 1)
         return Table(
             self.name,
-            cast("tuple[str, ...]", self.columns),
-            sample.rows.T,
+            columns.names,
+            columns.placed(sample.rows.T),
             classes,
             sample.codes,
             self.missing,
             self.unlabelled,
             self.target,
-            self.remarks,
+            (*self.remarks, *columns.remarks),
             weights=weights[sample.codes],
+            categories=columns.categories,
+            dates=columns.dates,
+        )
+
+    def _learnt_columns(self, statistics: Statistics) -> LearntColumns:
+        """Return what the columns are, now that all rows were taken."""
+        return columns_of(
+            self.name,
+            self.columns or (),
+            self._contents,
+            self.categorical,
+            statistics.sample().rows.T,
+            self._first,
         )
 
     def facts(self) -> dict[str, int]:
@@ -381,6 +428,7 @@ class Learner:
             self.target,
             columns=self.columns,
             ignore=self.ignore,
+            categorical=[*self.categorical],
             units=self.units,
             name=self.name,
             settings=self.settings,
@@ -411,7 +459,8 @@ class Learner:
         self._statistics = functools.reduce(Statistics.merge, full or [empty])
         self.columns, self._labels = rows.names, rows.labels
         self.unlabelled, self.missing = rows.unlabelled, rows.missing
-        self.remarks = tuple(rows.remarks)
+        self.remarks, self._contents = tuple(rows.remarks), rows.contents
+        self.categorical, self._first = rows.categorical, rows.first
 
     def _take(self, piece: LearningPiece, classes: int) -> None:
         """Take the rows of a piece of a table that has so many classes by now."""
@@ -459,6 +508,8 @@ class Learner:
         learner = cls(header.target, columns=header.columns, settings=settings)
         learner.unlabelled, learner.missing = header.unlabelled, header.missing
         learner._labels = labels
+        learner._contents = dict(zip(header.columns, header.contents, strict=False))
+        learner.categorical = frozenset(header.categorical)
         learner._parts = frozenset([*header.parts, header.digest])
         sizes = len(labels.keys), len(header.columns), header.rows_per_class
         learner._statistics = Statistics(*sizes, header.dropped)
@@ -483,6 +534,8 @@ class Learner:
             dropped=statistics.dropped,
             unlabelled=self.unlabelled,
             missing=self.missing,
+            contents=[self._contents.get(name, Contents()) for name in self.columns],
+            categorical=sorted(self.categorical),
             parts=sorted(self._parts),
         )
         return state_content(header, arrays)

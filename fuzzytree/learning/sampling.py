@@ -16,7 +16,7 @@ kept.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -113,7 +113,7 @@ class DistinctRows:
         """Offer rows; those that are kept are copied.
 
         Args:
-            values: Shape (rows, features), finite, without negative zeros.
+            values: Shape (rows, features), finite or codes, without negative zeros.
             codes: Class of each row.
         """
         digits = hashed_digits(values)
@@ -163,12 +163,13 @@ class DistinctRows:
         """
         kept = len(arrays.get("codes", ()))
         codes: IntArray = sized(arrays, "codes", np.int64, (kept,))
-        values = sized(arrays, "rows", np.float64, (kept, self.features)) + 0.0
+        values = sized(arrays, "rows", np.float64, (kept, self.features)).copy()
+        values[values == 0.0] = 0.0
         copies = sized(arrays, "copies", np.int64, (kept,))
         self._limits = sized(arrays, "limits", np.uint64, (self.classes,))
         self._refused = sized(arrays, "refused", np.uint64, (self.classes,))
         is_class = (codes >= 0) & (codes < self.classes)
-        if not (is_class.all() and (copies > 0).all() and np.isfinite(values).all()):
+        if not (is_class.all() and (copies > 0).all() and not np.isinf(values).any()):
             raise ValueError("keeps a row that cannot have been kept")
         if kept:
             digits, hashes = hashed_digits(values), hashed_rows(values)
@@ -182,6 +183,25 @@ class DistinctRows:
         self._limits = padded(self._limits, more, all_hashes)
         self._refused = padded(self._refused, more, all_hashes)
         self.classes = classes
+
+    def of_columns(self, kept: Sequence[int]) -> DistinctRows:
+        """Return the rows kept, with some of their columns."""
+        result = DistinctRows(self.classes, len(kept), self.most)
+        found = self.settle()
+        if found is not None:
+            values = np.ascontiguousarray(found.values[:, kept])
+            hashes = hashed_digits(values), hashed_rows(values)
+            result._parts = [_Rows(values, found.codes, *hashes, found.copies)]
+            result._kept = len(values)
+        return result
+
+    def keep_complete(self) -> None:
+        """Leave out rows with a value that is no finite number."""
+        found = self.settle()
+        if found is not None:
+            kept = np.flatnonzero(np.isfinite(found.values).all(axis=1))
+            self._parts = [found.at(kept)] if len(kept) else []
+            self._kept = self._settled = len(kept)
 
     def sample(self, lows: FloatArray, highs: FloatArray) -> Sample:
         """Return `most` rows of each class at most, in a canonical order.

@@ -40,8 +40,10 @@ class LearningSettings(
         seed: Moves the folds of inner validation.
         keep_reversals: Whether a wide set that overtakes again far outside gets the
             far interval (a second cut); otherwise it is counted and left out.
-        missing: Whether a row with a missing or infinite value is dropped and counted,
-            or refused.
+        missing: `learn`: what stands for a missing or infinite value is learnt, and
+            is part of the model. `drop`: such a row is left out and counted, as paper
+            mode does in any case, and has no class afterwards. `refuse`: it is an
+            error.
 
     Raises:
         ValueError: If a setting is out of its range; one sentence for each.
@@ -60,7 +62,7 @@ class LearningSettings(
     rows_per_class: int = 5_000
     seed: int = 0
     keep_reversals: bool = False
-    missing: Literal["drop", "refuse"] = "drop"
+    missing: Literal["learn", "drop", "refuse"] = "learn"
 
     def __post_init__(self) -> None:
         """Refuse settings out of their range."""
@@ -93,8 +95,8 @@ class LearningSettings(
                 f"rows_per_class is at least 1, not {self.rows_per_class!r}",
             ),
             (
-                self.missing in ("drop", "refuse"),
-                f"missing is 'drop' or 'refuse', not {self.missing!r}",
+                self.missing in ("learn", "drop", "refuse"),
+                f"missing is 'learn', 'drop' or 'refuse', not {self.missing!r}",
             ),
             (
                 isinstance(numbers, Mapping) or numbers in (None, "auto"),
@@ -114,6 +116,11 @@ class LearningSettings(
             text = f"the cost of {name!r} is finite and at least 0, not {cost!r}"
             claims.append((0 <= cost < math.inf, text))
         return claims
+
+    @property
+    def drops_missing(self) -> bool:
+        """Whether rows with a missing value are left out."""
+        return self.mode == "paper" or self.missing == "drop"
 
     @property
     def effective_l_max(self) -> float:

@@ -3,17 +3,19 @@
 A `Statistics` value takes rows in chunks of any size and in any order, and gives the
 same bits: sums are exact (`sums`), and the sample that it keeps for everything that
 needs rows (clusters, combinations, inner validation, window counts) depends on the rows
-alone (`sampling`).
+alone (`sampling`). The sample has incomplete rows too, with NaN where a value is
+missing, and codes of texts (`fuzzytree.columns`); sums are those of complete rows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
+from fuzzytree.columns import is_missing_code
 from fuzzytree.learning.sampling import DistinctRows, Sample
 from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, padded, runs, sized
 from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
@@ -50,7 +52,9 @@ class Statistics:
         classes: How many classes there are.
         features: How many columns there are.
         rows_per_class: How many rows of each class the sample keeps at most.
-        dropped: Rows left out so far because a value is missing or not finite.
+        dropped: Rows without a class, which are left out, and rows with a value that is
+            missing or not finite, which the sums leave out.
+        unlabelled: How many of these have no class.
 
     Example:
         >>> table = np.array([[1.0], [3.0], [7.0]])
@@ -64,10 +68,12 @@ class Statistics:
     features: int
     rows_per_class: int = 5_000
     dropped: int = 0
+    unlabelled: int = 0
     _filled: int = 0
     _block: FloatArray = field(init=False, repr=False)
     _block_codes: IntArray = field(init=False, repr=False)
     _counts: IntArray = field(init=False, repr=False)
+    _complete: IntArray = field(init=False, repr=False)
     _lows: FloatArray = field(init=False, repr=False)
     _highs: FloatArray = field(init=False, repr=False)
     _sums: Sums = field(init=False, repr=False)
@@ -80,6 +86,7 @@ class Statistics:
         self._block = np.empty((size, self.features))
         self._block_codes = np.empty(size, np.int64)
         self._counts = np.zeros(self.classes, np.int64)
+        self._complete = np.zeros(self.classes, np.int64)
         self._lows = np.full(shape, np.inf)
         self._highs = np.full(shape, -np.inf)
         self._sums = Sums(self.classes, self.features)
@@ -99,8 +106,7 @@ class Statistics:
             last = min(len(values), first + size - self._filled)
             piece = np.asarray(values[first:last], np.float64)
             chosen = codes[first:last]
-            usable = finite_rows(piece) & (chosen >= 0)
-            self._append(piece, chosen, usable)
+            self._append(piece, chosen, chosen >= 0)
             first = last
             if self._filled == size:
                 self._absorb()
@@ -108,10 +114,19 @@ class Statistics:
     def _append(self, piece: FloatArray, codes: IntArray, usable: BoolArray) -> None:
         count = int(np.count_nonzero(usable))
         self.dropped += len(piece) - count
+        self.unlabelled += len(piece) - count
         place = slice(self._filled, self._filled + count)
         everything = count == len(piece)
         # Adding zero makes a negative zero a positive one: they are equal numbers.
-        np.add(piece if everything else piece[usable], 0.0, out=self._block[place])
+        block = self._block[place]
+        np.add(piece if everything else piece[usable], 0.0, out=block)
+        is_complete = finite_rows(block)
+        if not is_complete.all():
+            block[:] = piece[usable]  # no sum, which may change the codes of texts
+            block[block == 0.0] = 0.0
+            is_missing = is_missing_code(block)
+            block[is_missing] = np.nan
+            self.dropped += int(np.count_nonzero(is_missing.any(axis=1)))
         self._block_codes[place] = codes if everything else codes[usable]
         self._filled += count
 
@@ -124,12 +139,20 @@ class Statistics:
         order = np.argsort(narrow(codes, self.classes), kind="stable")
         present, starts, counts = runs(codes[order])
         columns = np.take(values.T, order, axis=1)
-        lows = np.minimum.reduceat(columns, starts, axis=1).T
-        highs = np.maximum.reduceat(columns, starts, axis=1).T
-        self._lows[present] = np.minimum(self._lows[present], lows)
-        self._highs[present] = np.maximum(self._highs[present], highs)
+        lows = np.fmin.reduceat(columns, starts, axis=1).T
+        highs = np.fmax.reduceat(columns, starts, axis=1).T
+        self._lows[present] = np.fmin(self._lows[present], lows)
+        self._highs[present] = np.fmax(self._highs[present], highs)
         self._counts[present] += counts
-        self._sums.add(columns, present, starts, counts)
+        is_complete = finite_rows(values)
+        if not is_complete.all():
+            order = order[is_complete[order]]
+        if 0 < len(order) < len(is_complete):
+            present, starts, counts = runs(codes[order])
+            columns = np.take(values.T, order, axis=1)
+        if len(order):
+            self._complete[present] += counts
+            self._sums.add(columns, present, starts, counts)
         self._filled = 0
 
     def merge(self, other: Statistics) -> Statistics:
@@ -147,7 +170,12 @@ class Statistics:
         """
         self._absorb()
         rows = self._rows.arrays()
-        counted = {"counts": self._counts, "lows": self._lows, "highs": self._highs}
+        counted = {
+            "counts": self._counts,
+            "complete": self._complete,
+            "lows": self._lows,
+            "highs": self._highs,
+        }
         arrays = {**counted, **self._sums.arrays(), **rows}
         return {name: array.reshape(-1) for name, array in arrays.items()}
 
@@ -160,14 +188,15 @@ class Statistics:
         """
         shape = (self.classes, self.features)
         self._counts = sized(arrays, "counts", np.int64, (self.classes,))
+        self._complete = sized(arrays, "complete", np.int64, (self.classes,))
         self._lows = sized(arrays, "lows", np.float64, shape)
         self._highs = sized(arrays, "highs", np.float64, shape)
-        if (self._counts < 0).any() or self.dropped < 0:
+        is_count = (self._complete >= 0) & (self._complete <= self._counts)
+        if not is_count.all() or self.dropped < 0:
             raise ValueError("counts a negative number of rows")
         is_low = self._lows <= self._highs
-        if not np.where(
-            (self._counts == 0)[:, None], self._lows > self._highs, is_low
-        ).all():
+        is_none = (self._lows == np.inf) & (self._highs == -np.inf)
+        if not np.where((self._counts == 0)[:, None], is_none, is_low | is_none).all():
             raise ValueError("has smallest values above the largest")
         self._sums.fill(arrays)
         self._rows.fill(arrays)
@@ -176,6 +205,7 @@ class Statistics:
         """Make room for classes without rows."""
         more = classes - self.classes
         self._counts = padded(self._counts, more, 0)
+        self._complete = padded(self._complete, more, 0)
         self._lows = padded(self._lows, more, np.inf)
         self._highs = padded(self._highs, more, -np.inf)
         self._sums.grow(classes)
@@ -198,20 +228,22 @@ class Statistics:
         """Add what was counted of other rows, by the numbers of their classes here."""
         other._absorb()
         self.dropped += other.dropped
+        self.unlabelled += other.unlabelled
         np.add.at(self._counts, positions, other._counts)
+        np.add.at(self._complete, positions, other._complete)
         np.minimum.at(self._lows, positions, other._lows)
         np.maximum.at(self._highs, positions, other._highs)
         self._sums.take(other._sums, positions, np.arange(self.features))
         self._rows.take(other._rows, positions)
 
     def moments(self, units: ColumnUnits | None = None) -> Moments:
-        """Return the moments of all rows taken so far, each number rounded once.
+        """Return the moments of all complete rows so far, each number rounded once.
 
         Args:
             units: Of the columns; the table's own unless given.
         """
         self._absorb()
-        counts = self._counts.tolist()
+        counts = self._complete.tolist()
         if units is None:
             means, spreads = self._sums.moments(counts)
         else:
@@ -220,16 +252,16 @@ class Statistics:
             means[:, ~units.is_sound] = spreads[:, ~units.is_sound] = 0.0
         lows, highs = self._lows.copy(), self._highs.copy()
         if units is not None:
-            filled = self._counts > 0
+            filled = self._complete > 0
             lows[filled], highs[filled] = map(
                 units.moved, (lows[filled], highs[filled])
             )
-        return Moments(self._counts.copy(), means, spreads, lows, highs)
+        return Moments(self._complete.copy(), means, spreads, lows, highs)
 
     def totals(self, feature: int) -> Totals:
-        """Return the exact sums of one column by class."""
+        """Return the exact sums of one column by class, of complete rows."""
         self._absorb()
-        return self._sums.totals(feature, self._counts.tolist())
+        return self._sums.totals(feature, self._complete.tolist())
 
     def counts(self) -> IntArray:
         """Return how many rows of each class were taken so far."""
@@ -237,7 +269,7 @@ class Statistics:
         return self._counts.copy()
 
     def extent(self, feature: int) -> tuple[float, float]:
-        """Return the smallest and the largest value of a column."""
+        """Return the smallest and the largest value of a column that are known."""
         self._absorb()
         return float(self._lows[:, feature].min()), float(self._highs[:, feature].max())
 
@@ -248,6 +280,30 @@ class Statistics:
             self._lows.min(axis=0, initial=np.inf),
             self._highs.max(axis=0, initial=-np.inf),
         )
+
+    def of_columns(self, kept: Sequence[int]) -> Statistics:
+        """Return the statistics of some of the columns."""
+        if len(kept) == self.features:
+            return self
+        found = Statistics(self.classes, len(kept), self.rows_per_class)
+        self._absorb()
+        found.dropped, found.unlabelled = self.dropped, self.unlabelled
+        found._counts, found._complete = self._counts.copy(), self._complete.copy()
+        found._lows, found._highs = self._lows[:, kept], self._highs[:, kept]
+        found._sums = self._sums.of_features(np.array(kept, np.int64))
+        found._rows = self._rows.of_columns(kept)
+        return found
+
+    def complete(self) -> Statistics:
+        """Return what was counted of complete rows, and those of the sample.
+
+        The range of a column stays that of all rows.
+        """
+        found = Statistics(self.classes, self.features, self.rows_per_class)
+        found._take(self, np.arange(self.classes))
+        found._counts = found._complete.copy()
+        found._rows.keep_complete()
+        return found
 
 
 def block_rows(features: int) -> int:

@@ -261,6 +261,15 @@ class Sums:
         self._squares = padded(self._squares, more, 0)
         self.groups = groups
 
+    def of_features(self, features: IntArray) -> Sums:
+        """Return the totals of some features."""
+        self._settle()
+        found = Sums(len(self._sums), len(features))
+        found._unit = self._unit[features]
+        found._sums = self._sums[:, features]
+        found._squares = self._squares[:, features]
+        return found
+
     def take(self, other: Sums, groups: IntArray, features: IntArray) -> None:
         """Add the totals of some groups and features."""
         other._settle()

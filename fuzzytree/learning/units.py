@@ -64,7 +64,7 @@ def units_of(rows: FloatArray, lows: FloatArray, highs: FloatArray) -> ColumnUni
     """
     middle = (len(rows) - 1) // 2
     origins = np.partition(rows, middle, axis=0)[middle]
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         ranges = highs - lows
     is_sound = (lows < highs) & np.isfinite(ranges)
     exponents = np.frexp(np.where(is_sound, ranges, 1.0))[1].astype(np.int64)

@@ -169,6 +169,7 @@ from .tree import node_mistakes as node_mistakes
 from .tree import outline as outline
 from .tree import with_label_type as with_label_type
 from .values import Value as Value
+from .variables import DATE_UNIT as DATE_UNIT
 from .variables import Part as Part
 from .variables import Term as Term
 from .variables import Variable as Variable

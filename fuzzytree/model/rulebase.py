@@ -33,6 +33,7 @@ from fuzzytree.model.probabilities import (
 )
 from fuzzytree.model.rules import Proposition as Proposition
 from fuzzytree.model.values import Value as Value
+from fuzzytree.model.variables import DATE_UNIT as DATE_UNIT
 from fuzzytree.model.variables import Part as Part
 from fuzzytree.model.variables import Term as Term
 from fuzzytree.model.variables import Variable as Variable

@@ -16,6 +16,9 @@ from fuzzytree.model.mistakes import (
 )
 from fuzzytree.model.values import Value
 
+DATE_UNIT = "days since 1970-01-01"
+"""The unit of a column of dates (UTC); it says that cells may be dates."""
+
 
 class Term(Value, frozen=True):
     """A label of a variable, and what it means.

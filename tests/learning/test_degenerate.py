@@ -277,6 +277,7 @@ def test_masked_cells_and_labels_are_missing_to_the_learner() -> None:
     labels = np.ma.MaskedArray([0, 0, 0, 1, 1, 1], [*[False] * 5, True])
     learner = ArrayLearner(["a"], ["soft", "firm"])
     learner.partial_fit(values, labels)
-    assert learner.finish().report.rows_dropped == 2
+    report = learner.finish().report
+    assert (report.rows_dropped, report.rows_filled) == (1, 1)
     with pytest.raises(ValueError, match=r"^the array holds timedelta64\[s\], and no"):
         learner.partial_fit(np.zeros((1, 1), "m8[s]"), np.array([0]))

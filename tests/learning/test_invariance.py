@@ -86,7 +86,7 @@ def in_units(tree: FuzzyTree, units: dict[str, Unit]) -> FuzzyTree:
             own = units[part["input"]]
             part["weight"] = math.ldexp(part["weight"], -own.exponent)
             part["centre"] = own.value(part.get("centre", 0.0))
-        _convert(variable, ("low", "high"), unit.value)
+        _convert(variable, ("low", "high", "missing"), unit.value)
         for term in variable["terms"]:
             _convert(term["function"], ("low", "high", "left", "right"), unit.value)
     for node in plain["nodes"]:

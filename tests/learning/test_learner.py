@@ -197,7 +197,8 @@ def test_every_departure_is_reported() -> None:
     values = np.column_stack([values, np.full(200, 0.1)])
     values[5, 1] = np.nan
     values[9, 0] = np.inf
-    found = learn(values, labels, classes=["c0", "c1", "ghost"])
+    settings = LearningSettings(missing="drop")
+    found = learn(values, labels, settings, classes=["c0", "c1", "ghost"])
     report = found.report
     assert report.rows == 198
     assert report.rows_dropped == 2
@@ -205,7 +206,7 @@ def test_every_departure_is_reported() -> None:
     assert report.classes_without_rows == ("ghost",)
     assert report.patterns == {"c0": 1, "c1": 1}
     assert found.tree.classes == ("c0", "c1", "ghost")
-    assert "rows dropped, a value is missing or not finite: 2" in str(report)
+    assert "rows dropped, a value or the class is missing: 2" in str(report)
 
 
 def test_patterns_without_rows_are_refused_and_counted() -> None:

@@ -20,7 +20,7 @@ from fuzzytree.learning import LearningSettings
         ({"entry": -1.0}, "entry is at least 0, not -1.0"),
         ({"entry": float("nan")}, "entry is at least 0, not nan"),
         ({"rows_per_class": 0}, "rows_per_class is at least 1, not 0"),
-        ({"missing": "guess"}, "missing is 'drop' or 'refuse', not 'guess'"),
+        ({"missing": "guess"}, "missing is 'learn', 'drop' or 'refuse', not 'guess'"),
         ({"patterns_per_class": 0}, "patterns_per_class is at least 1, not 0"),
         (
             {"patterns_per_class": {"a": 0}},
