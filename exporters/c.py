@@ -49,6 +49,7 @@ from fuzzytree.model import (
     narrowing_refusal,
     outline,
     sentence,
+    stand_ins,
 )
 from fuzzytree.numerics import losses
 
@@ -278,7 +279,8 @@ class CFile(CModel):
         for word, label in defaults.items():
             yield f"#define NAME_WHEN_{word} {number_of(label, model)}\n"
         yield from axes_code(model.variables, self.line, self.numbers)
-        axes = _TAKE_COMBINED if any(v.parts for v in model.variables) else _TAKE
+        is_new = has_own_values(model.variables)
+        axes = _TAKE_COMBINED if is_new else _TAKE
         if isinstance(model, FuzzyTree):
             yield from tree_code(self, model, axes)
         elif self.tables is not None:
@@ -295,11 +297,11 @@ class CFile(CModel):
     def _declarations(self) -> Iterator[str]:
         model, rules = self.model, isinstance(self.model, RuleBase)
         count = len(model.rules) if isinstance(model, RuleBase) else len(model.leaves)
-        mixed = [v for v in model.variables if v.parts]
+        is_new = has_own_values(model.variables)
         yield self._fill(f"typedef {self.numbers.name} name_real;\n\n")
         for what, size in (
             ("INPUTS", len(model.inputs)),
-            ("VARIABLES", len(model.variables) if mixed else None),
+            ("VARIABLES", len(model.variables) if is_new else None),
             ("CLASSES", len(model.classes)),
             ("RULES" if rules else "LEAVES", count),
         ):
@@ -310,10 +312,31 @@ class CFile(CModel):
         for place, label in enumerate(labels):
             yield f",\n    {label} = {place} /* {remark(model.classes[place])} */"
         yield "\n};\n"
+        for variable in model.variables:
+            yield from self._categories(variable)
         yield self._fill(_TYPES).replace("RULE,", "rule," if rules else "leaf,")
         yield self._fill(_STRENGTHS_TYPE) if rules else ""
         yield self._fill(_PROBABILITIES_TYPE) if self.probabilities else ""
         yield "\n#ifdef __cplusplus\n}\n#endif\n"
+
+    def _categories(self, variable: Variable) -> Iterator[str]:
+        """Yield the positions of an input's categories."""
+        if variable.categories:
+            [kind] = constants("", [variable.name])
+            prefix = self._fill(f"NAME_{kind}_")
+            yield self._fill(f"\nenum name_{kind.lower()} {{")
+            yield f" /* x[{self.line[variable.name]}] */"
+            names = constants(prefix, variable.categories)
+            for place, name in enumerate(names):
+                comma = "," if place else ""
+                text = remark(variable.categories[place])
+                yield f"{comma}\n    {name} = {place} /* {text} */"
+            yield "\n};\n"
+
+
+def has_own_values(variables: Sequence[Variable]) -> bool:
+    """Return whether the values of variables are others than those of the inputs."""
+    return any(v.parts or v.missing is not None for v in variables)
 
 
 def _heading(model: Document) -> Iterator[str]:
@@ -346,7 +369,12 @@ def _heading(model: Document) -> Iterator[str]:
 
 
 def _described(one: Variable | SystemOutput) -> str:
-    return remark(f"{one.name} ({one.unit})" if one.unit else one.name)
+    text = f"{one.name} ({one.unit})" if one.unit else one.name
+    if isinstance(one, Variable) and one.categories:
+        text += ": the position of a category, from 0"
+    if isinstance(one, Variable) and one.missing is not None:
+        text += f"; {one.missing!r} stands for a missing value"
+    return remark(text)
 
 
 _FINITE = """
@@ -370,17 +398,47 @@ static int name_has_all(const name_real *x)
 }
 """
 
+_FILL = """
+/* Put what stands for a missing or infinite value in its place. */
+static void name_fill(const name_real *x, name_real *value)
+{
+    unsigned place;
+    for (place = 0; place < NAME_INPUTS; place++) {
+        value[place] = x[place];
+        if (name_is_replaced[place] && !name_is_finite(x[place]))
+            value[place] = name_stand_in[place];
+    }
+}
+"""
+
+_FILLED_INPUTS = """
+static int name_has_all(const name_real *x, name_real *value)
+{
+    unsigned place = NAME_INPUTS;
+    name_fill(x, value);
+    while (place > 0)
+        if (!name_is_finite(value[--place]))
+            return 0;
+    return 1;
+}
+"""
+
+_COPY = """\
+    for (place = 0; place < NAME_INPUTS; place++)
+        value[place] = x[place];
+"""
+
 _COMBINED = """
 /* Inputs, then combinations: weight * (input - centre), summed in order. */
 static int name_has_all(const name_real *x, name_real *value)
 {
     unsigned place, part = 0, end;
-    for (place = 0; place < NAME_INPUTS; place++)
-        value[place] = x[place];
+COPY
     for (place = 0; place < NAME_VARIABLES - NAME_INPUTS; place++) {
-        name_real total = name_weight[part] * (x[name_part[part]] - name_centre[part]);
+        name_real one = value[name_part[part]] - name_centre[part];
+        name_real total = name_weight[part] * one;
         for (end = name_part_end[place], part++; part < end; part++) {
-            name_real one = x[name_part[part]] - name_centre[part];
+            one = value[name_part[part]] - name_centre[part];
             total = total + name_weight[part] * one;
         }
         value[NAME_INPUTS + place] = total;
@@ -431,8 +489,18 @@ def axes_code(
     for mark, word in zip(("UINT", "HIGH", "REST"), words, strict=True):
         text = text.replace(mark, word)
     mixed = [variable for variable in variables if variable.parts]
+    stand = stand_ins(variables)
+    copy = _COPY
+    if stand:
+        columns = [v.name for v in variables if not v.parts]
+        about = "What stands for a missing value."
+        values = numbers.rounded([stand.get(name, 0.0) for name in columns])
+        yield from real_table("name_stand_in", values, about, numbers)
+        is_replaced = [int(name in stand) for name in columns]
+        yield from whole_table("name_is_replaced", is_replaced, "Whether it does.")
+        text, copy = text + _FILL, "    name_fill(x, value);\n"
     if not mixed:
-        yield text + _INPUTS + "\n"
+        yield text + (_FILLED_INPUTS if stand else _INPUTS) + "\n"
         return
     parts = [part for variable in mixed for part in variable.parts]
     ends: list[int] = []
@@ -445,7 +513,7 @@ def axes_code(
     inputs = [line[part.input] for part in parts]
     yield from whole_table("name_part", inputs, "Their inputs.")
     yield from whole_table("name_part_end", ends, "Behind each combination.")
-    yield text + _COMBINED + "\n"
+    yield text + _COMBINED.replace("COPY\n", copy) + "\n"
 
 
 _WALK = """

@@ -14,7 +14,7 @@ import numpy as np
 from fuzzytree.exporters.c_tables import HIGH_END, LOW_END, POINTS, CModel, Tables
 from fuzzytree.exporters.c_text import CNumbers, bits_of
 from fuzzytree.exporters.program_text import answer_of, digest_of
-from fuzzytree.model import FuzzyTree, Model
+from fuzzytree.model import FuzzyTree, Model, stand_ins
 from fuzzytree.semantics import Answer, Row, Status, few_probes
 
 _MOST_ROWS = 160
@@ -179,7 +179,12 @@ def answer_of_tables(file: CModel, row: Row) -> Answer:
 def _axis_values(file: CModel, row: Row) -> list[Real] | None:
     """Return the value of each variable; None if one is not finite."""
     numbers = file.numbers
+    stand = stand_ins(file.model.variables)
     result: list[Real] = [numbers.kind(row[name]) for name in file.model.inputs]
+    for place, name in enumerate(file.model.inputs):
+        if name in stand and not np.isfinite(result[place]):
+            [value] = numbers.rounded([stand[name]])
+            result[place] = numbers.kind(value)
     for variable in file.model.variables:
         total: Real | None = None
         for part in variable.parts:

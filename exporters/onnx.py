@@ -302,6 +302,8 @@ def _fill(
     """Add all nodes of a tree or rule base to a graph."""
     from fuzzytree.exporters import onnx_ends
 
+    if not readable:
+        onnx_ends.fill_inputs(graph, model, columns)
     if isinstance(model, FuzzyTree):
         from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
 

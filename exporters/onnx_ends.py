@@ -22,6 +22,7 @@ from fuzzytree.model import (
     Variable,
     parts_of,
     squarings,
+    stand_ins,
 )
 from fuzzytree.numerics import RealKind, rounded
 from fuzzytree.semantics import Status
@@ -44,6 +45,26 @@ class InputBlock(msgspec.Struct, frozen=True):
     block: str
     order: dict[str, int]
     guard: str
+
+
+def fill_inputs(graph: OnnxGraph, model: Model, columns: Sequence[str]) -> None:
+    """Replace values that are not finite by what stands for missing ones.
+
+    The source of the graph becomes the inputs with the replaced values.
+    """
+    known = stand_ins(model.variables)
+    if not known:
+        return
+    values = [known.get(name, np.nan) for name in columns]
+    with graph.about("missing values"):
+        zero = graph.number(0.0, graph.types.axis)
+        zeros = graph.node("Mul", graph.source, zero, hint="zero_if_finite")
+        is_finite = graph.node("Equal", zeros, zero, hint="is_finite")
+        numbers = rounded(values, graph.types.axis)
+        stand = graph.constant(numbers.reshape(1, -1), "stand_ins")
+        graph.source = graph.node(
+            "Where", is_finite, graph.source, stand, hint="filled"
+        )
 
 
 def axes(

@@ -14,6 +14,7 @@ A row with a value that is missing or not finite has a branch of its own.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
@@ -141,7 +142,7 @@ def _written_system(system: FuzzySystem) -> Written:
     predictor = element("NumericPredictor", name=result, coefficient="1")
     model = element(
         "RegressionModel",
-        schema(system.inputs, first.name),
+        schema(system.variables, first.name),
         *([element("Output", *outputs)] if outputs else []),
         element("RegressionTable", predictor, intercept="0"),
         modelName=system.name,
@@ -166,6 +167,14 @@ def _content(*parts: XmlElement) -> bytes:
     root = element("PMML", *parts, version="4.4", xmlns=xmlns)
     text = f'<?xml version="1.0" encoding="UTF-8"?>\n{text_of(root)}\n'
     return text.encode("utf-8")
+
+
+_FINITE = element(
+    "Interval",
+    closure="closedClosed",
+    leftMargin=repr(-sys.float_info.max),
+    rightMargin=repr(sys.float_info.max),
+)
 
 
 class _Names:
@@ -224,9 +233,12 @@ def _columns(variables: Iterable[Variable]) -> Iterator[XmlElement]:
             "low": "" if variable.low is None else repr(float(variable.low)),
             "high": "" if variable.high is None else repr(float(variable.high)),
         }
+        names = {f"category {k}": name for k, name in enumerate(variable.categories)}
+        finite = [] if variable.missing is None else [_FINITE]
         yield element(
             "DataField",
-            *(_extension(name, text) for name, text in known.items() if text),
+            *(_extension(name, text) for name, text in (known | names).items() if text),
+            *finite,
             name=variable.name,
             **NUMBER,
         )
@@ -266,7 +278,7 @@ def _model(
     ]
     return element(
         "TreeModel",
-        schema(model.inputs, names.target),
+        schema(model.variables, names.target),
         element("Output", *fields, *outputs),
         element("Node", element("True"), *nodes, id="0"),
         modelName=model.name,

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from fuzzytree.exporters.xml_text import XmlElement, element
-from fuzzytree.model import Points
+from fuzzytree.model import Points, Variable
 
 NUMBER = {"optype": "continuous", "dataType": "double"}
 TEXT = {"optype": "categorical", "dataType": "string"}
@@ -50,11 +50,22 @@ def definition(
     return element("DefineFunction", *fields, body, name=name, **gives)
 
 
-def schema(inputs: Iterable[str], target: str) -> XmlElement:
-    """Return the fields that a model takes as they are, and the one it predicts."""
+def schema(inputs: Iterable[Variable], target: str) -> XmlElement:
+    """Return the fields that a model takes as they are, and the one it predicts.
+
+    What stands for a missing value replaces an infinite one as well, which is invalid.
+    """
     fields = [
-        element("MiningField", name=name, invalidValueTreatment="asIs")
-        for name in inputs
+        element("MiningField", name=one.name, invalidValueTreatment="asIs")
+        if one.missing is None
+        else element(
+            "MiningField",
+            name=one.name,
+            missingValueReplacement=repr(float(one.missing)),
+            invalidValueTreatment="asMissing",
+        )
+        for one in inputs
+        if not one.parts
     ]
     target_field = element("MiningField", name=target, usageType="target")
     return element("MiningSchema", *fields, target_field)

@@ -150,12 +150,12 @@ def strengths_of(rules: RuleBase) -> tuple[Program, list[int]]:
     """Return a program that computes strengths where all values are known.
 
     Combinations are inputs of it: they are computed before, where it is known what is
-    missing.
+    missing. So are inputs whose missing values are replaced.
 
     Returns:
         The program, and the place of each rule's strength.
     """
-    plain = tuple(replace(variable, parts=()) for variable in rules.variables)
+    plain = tuple(replace(v, parts=(), missing=None) for v in rules.variables)
     program = from_rules(replace(rules, variables=plain, columns=()))
     # What is shown is the strength where all values are known, else NaN.
     shown = [(place, program.steps[place]) for place in program.of("strength")]

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import ClassVar, Literal, get_args
 
+from fuzzytree.columns import BOOLEANS
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.program_text import (
     StepText,
@@ -28,6 +29,7 @@ from fuzzytree.model import (
     Model,
     Node,
     RuleBase,
+    Variable,
     Written,
     fingerprint,
     parts_of,
@@ -161,7 +163,7 @@ def _axes(query: Query, model: Model) -> Iterator[str]:
             ]
             mixes.append(f"{' + '.join(terms)} AS {name}")
         else:
-            columns.append(f"{query.column(variable.name)} AS {name}")
+            columns.append(f"{query.filled(variable)} AS {name}")
     yield "WITH"
     yield query.step("columns")
     yield f"  SELECT\n{_listed([*kept, *columns] or ['1 AS x_0'])}"
@@ -404,6 +406,32 @@ class Query:
             is_number = f"typeof({source}) IN ('integer', 'real')"
             return f"CASE WHEN {is_number} THEN CAST({source} AS REAL) END"
         return f"CAST({source} AS {self.double})"
+
+    def filled(self, variable: Variable) -> str:
+        """Return a column as doubles, with what stands for missing and unknown ones."""
+        value = self.column(variable.name)
+        if variable.categories:
+            value = self._position(variable)
+        if variable.missing is None:
+            return value
+        stand = self.number(variable.missing)
+        test = f"{value} BETWEEN -{_LARGEST} AND {_LARGEST}"
+        return f"CASE WHEN {test} THEN {value} ELSE {stand} END"
+
+    def _position(self, variable: Variable) -> str:
+        """Return the position of a column's category; NULL of an unknown one.
+
+        SQLite, whose columns hold anything, takes a position as well.
+        """
+        source = self.name(variable.name)
+        if variable.categories == BOOLEANS and self.dialect != "sqlite":
+            return f"CASE WHEN {source} THEN 1e0 WHEN NOT {source} THEN 0e0 END"
+        cases = " ".join(
+            f"WHEN {self.text(name)} THEN {place}e0"
+            for place, name in enumerate(variable.categories)
+        )
+        own = f" ELSE {self.column(variable.name)}" if self.dialect == "sqlite" else ""
+        return f"CASE {source} {cases}{own} END"
 
     def text(self, text: str | None) -> str:
         """Return a text as a literal."""

@@ -42,6 +42,7 @@ from fuzzytree.model import (
     Variable,
     Written,
     fingerprint,
+    stand_ins,
 )
 from fuzzytree.semantics import from_system
 
@@ -94,7 +95,8 @@ def write(
     given = name or model.name
     names = identifiers(model.inputs, taken)
     block = identifiers([given], [*taken, *names.accepted.values()])[given]
-    values = {**names.accepted, **combined}
+    filled = {name: f"in_{k}" for k, name in enumerate(stand_ins(model.variables), 1)}
+    values = {**names.accepted, **filled, **combined}
     if isinstance(model, RuleBase):
         constants, local, body = _rules(model, values, numbers)
     else:
@@ -102,9 +104,17 @@ def write(
     lines = [
         *_interface(model, names, numbers),
         *block_of("VAR CONSTANT", constants),
-        *block_of("VAR", [*_mixed_lines(mixed, combined, numbers), *local]),
+        *block_of(
+            "VAR",
+            [
+                *_mixed_lines(mixed, combined, numbers),
+                *(f"    {one} : {numbers.name};\n" for one in filled.values()),
+                *local,
+            ],
+        ),
         "\n",
-        *_guard(model, names, mixed, combined, numbers),
+        *_fill(model, names, filled, numbers),
+        *_guard(model, values, mixed, combined, numbers),
         *body,
     ]
     return _written(model, (given, block), names, lines)
@@ -136,7 +146,8 @@ def _taken(model: Model, combined: Mapping[str, str]) -> list[str]:
     if isinstance(model, RuleBase):
         count = len(RuleSteps(model, {}, LONG).program.steps)
     steps = [f"{letter}{k}" for letter in "vbnt" for k in range(count)]
-    return [*_OUTPUTS, *_LOCALS, *combined.values(), *steps]
+    filled = [f"in_{k}" for k, _ in enumerate(stand_ins(model.variables), 1)]
+    return [*_OUTPUTS, *_LOCALS, *combined.values(), *filled, *steps]
 
 
 def _interface(model: Model, names: NameMap, numbers: StNumbers) -> Iterator[str]:
@@ -164,15 +175,27 @@ def _mixed_lines(
         yield f"    {combined[variable.name]} : {numbers.name}; (* {about} *)\n"
 
 
+def _fill(
+    model: Model, names: NameMap, filled: Mapping[str, str], numbers: StNumbers
+) -> Iterator[str]:
+    """Yield statements that put what stands for a missing value in its place."""
+    stand, largest = stand_ins(model.variables), numbers.literal(numbers.largest)
+    for name, own in filled.items():
+        value = numbers.literal(numbers.nearest(stand[name]))
+        yield f"{own} := {names[name]};\n"
+        yield f"IF NOT ({own} = {own}) THEN {own} := {value}; END_IF;\n"
+        yield f"IF ABS({own}) > {largest} THEN {own} := {value}; END_IF;\n"
+
+
 def _guard(
     model: Model,
-    names: NameMap,
+    names: Mapping[str, str],
     mixed: list[Variable],
     combined: Mapping[str, str],
     numbers: StNumbers,
 ) -> Iterator[str]:
     """Yield statements that find missing values and set the outputs for them."""
-    yield from known_inputs(list(names.accepted.values()), numbers)
+    yield from known_inputs([names[name] for name in model.inputs], numbers)
     if mixed:
         largest = numbers.literal(numbers.largest)
         yield "IF is_known THEN\n"

@@ -32,7 +32,9 @@ def table() -> pd.DataFrame:
 def tree(table: pd.DataFrame) -> FuzzyTree:
     """Return a tree whose supports are estimated."""
     return ft.learn(
-        table, target="kind", settings=ft.LearningSettings(rows_per_class=40)
+        table,
+        target="kind",
+        settings=ft.LearningSettings(rows_per_class=40, missing="drop"),
     )
 
 

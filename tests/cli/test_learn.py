@@ -67,9 +67,10 @@ def test_what_was_left_out_is_reported(call: Call) -> None:
         "learnt   2 leaves depth 1, 1 of 2 columns, 0 s\n"
         "read     t.csv    13 rows, 2 columns, 2 classes "
         "(1 missing cell, 1 row without a class left out), 0 s\n"
-        "dropped  1 row    a value is missing or not finite\n"
+        "filled   1 row    a value is missing; what stands for it is part of the model\n"
         "ignored  1 column constant or too large: same\n"
-        "adjusted 2 sets   sides whose polynomial rises: 2\n"
+        "adjusted 2 sets   sets with a fuller window than the middle one: 1; points "
+        "clipped to 1: 3; sides whose polynomial rises: 1\n"
         "wrote    t.yaml   next: fuzzytree check t.yaml --data t.csv\n"
     )
 
@@ -225,10 +226,13 @@ def test_a_wrong_option_is_one_sentence(
             "t.csv has no column 'grip'; it has a, grap (did you mean 'grap'?)",
         ),
         (
-            "a,b,grip\n1,wet,x\nq,2,y\n",
-            "t.csv:3: column 'a' holds text where a number is needed: 'q'\n"
-            "t.csv:2: column 'b' holds text where a number is needed: 'wet'\n"
-            "  leave columns out with ignore (--ignore a --ignore b)",
+            "a,b,grip\n" + 10 * "1,2,x\n" + "1,wet,x\nq,2,y\n",
+            "t.csv:13: column 'a' holds text where a number is needed: 'q' "
+            "(1 among 11 numbers)\n"
+            "t.csv:12: column 'b' holds text where a number is needed: 'wet' "
+            "(1 among 11 numbers)\n"
+            "  leave columns out with ignore (--ignore a --ignore b), or take all their "
+            "cells as categories with categorical (--categorical a --categorical b)",
         ),
         (
             "a,grip\n1,x\n1,y\n1,x\n",
@@ -236,7 +240,7 @@ def test_a_wrong_option_is_one_sentence(
             "or so wide that its range overflows",
         ),
         (
-            "a,grip\n1,x\nnan,y\ninf,y\n2,x\n",
+            "a,grip\n1,x\nnan,x\ninf,x\n2,x\n",
             "cannot learn from one class: every row is 'x'",
         ),
         ("a,a,grip\n1,1,x\n", "t.csv: column 'a' stands there more than once"),

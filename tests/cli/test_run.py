@@ -20,6 +20,7 @@ TALLY = (
     "predicted 4 rows firm 1, loose 1, soft 1, no class 1\n"
     "status    0 rows decided by the order of the rules; 0 rows with no rule fired; "
     "1 row with a missing input\n"
+    "missing   1 cell in the inputs\n"
     "ignored   2 columns\n"
 )
 

@@ -120,7 +120,8 @@ def test_text_of_a_parquet_file_stays_text(tmp_path: Path) -> None:
 
 
 def test_a_row_without_a_class_is_none_beside_numbers() -> None:
-    tree = ft.learn(VALUES, target=LABELS["integers"])
+    settings = ft.LearningSettings(missing="drop")
+    tree = ft.learn(VALUES, target=LABELS["integers"], settings=settings)
     found = ft.run(tree, np.array([[1.0], [np.nan]]))
     assert found.classes == [0, None]
     assert found.to_csv() == "class,rule,status\n0,1,decided\n,0,missing\n"

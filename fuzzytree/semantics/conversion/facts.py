@@ -56,6 +56,8 @@ class _Named(Value, frozen=True):
     low: float | None = None
     high: float | None = None
     parts: tuple[Part, ...] = ()
+    categories: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+    missing: float | msgspec.UnsetType = msgspec.UNSET
 
 
 class _Facts(Value, frozen=True):
@@ -112,7 +114,14 @@ def facts_of(
         semantics=rules.semantics,
         variables=tuple(
             _Named(
-                v.name, tuple(t.name for t in v.terms), v.unit, v.low, v.high, v.parts
+                v.name,
+                tuple(t.name for t in v.terms),
+                v.unit,
+                v.low,
+                v.high,
+                v.parts,
+                v.categories or msgspec.UNSET,
+                msgspec.UNSET if v.missing is None else v.missing,
             )
             for v in rules.variables
         ),
@@ -309,6 +318,8 @@ def _rules(facts: _Facts, curves: Mapping[int, Sequence[Term]]) -> RuleBase:
             v.low,
             v.high,
             v.parts,
+            categories=() if v.categories is msgspec.UNSET else v.categories,
+            missing=None if v.missing is msgspec.UNSET else v.missing,
         )
         for place, v in enumerate(facts.variables)
     )

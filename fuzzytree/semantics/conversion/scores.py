@@ -62,6 +62,7 @@ from fuzzytree.model import (
     Variable,
     combined,
     questions,
+    stand_ins,
     unlike,
 )
 
@@ -97,7 +98,7 @@ def as_system(
         >>> [output.name for output in as_system(rules, "rule").outputs]
         ['score 1 class 1', 'score 2 class 1']
     """
-    inputs = rules.variables
+    inputs = tuple(replace(one, categories=(), missing=None) for one in rules.variables)
     tautology: Condition | None = None
     needs_one = scores != "winner" or any(not rule.when for rule in rules.rules)
     if always != "nothing" and needs_one:
@@ -187,6 +188,20 @@ def cast_remarks(rules: RuleBase, scores: Scores = "rule") -> tuple[str, ...]:
         results.append(
             "rules whose strengths differ by less than 1 part in 2^50 may change places"
         )
+    stand = [f"{v!r} of {name!r}" for name, v in stand_ins(rules.variables).items()]
+    if stand:
+        more = f" and {len(stand) - 8} more" if len(stand) > 8 else ""
+        results.append(
+            "the caller replaces a missing value by what stands for it: "
+            f"{', '.join(stand[:8])}{more}"
+        )
+    for one in rules.variables:
+        if one.categories:
+            shown = [f"{k} {name}" for k, name in enumerate(one.categories[:8])]
+            dots = ", ..." if len(one.categories) > 8 else ""
+            results.append(
+                f"{one.name!r} is the position of a category: {', '.join(shown)}{dots}"
+            )
     return tuple(results)
 
 

@@ -244,11 +244,12 @@ def test_an_unknown_target_is_refused_with_a_hint(frame_of: Frame) -> None:
     )
 
 
-def test_text_among_the_numbers_is_refused_with_its_row(frame_of: Frame) -> None:
+def test_text_among_the_numbers_is_refused(frame_of: Frame) -> None:
     good = pa.table({"cm": ["1.0"] * 9, "size": ["s"] * 9})
     bad = pa.table({"cm": ["2.0", "wide"], "size": ["b", "b"]})
     assert refused(lambda: ft.learn(frame_of(good, bad), target="size")) == (
-        "the table, row 11: column 'cm' holds text where a number is needed: 'wide'"
+        "the table: column 'cm' holds text where a number is needed: 'wide' "
+        "(1 among 10 numbers)"
     )
 
 
