@@ -199,7 +199,8 @@ class ArrayLearner:
         if progress is not None:
             progress("fitting sets", 1.0)
         places = {name: place for place, name in enumerate(self.columns)}
-        tree = with_probabilities(made.tree, sample, moments.counts, places)
+        counts = moments.counts if drops else self.statistics.counts()
+        tree = with_probabilities(made.tree, sample, counts, places)
         if self.settings.mode != "paper":
             tree = described(tree, self.columns, table, self.statistics)
         return Learnt(tree, self._report(moments, sample, choice, made))

@@ -67,7 +67,8 @@ def test_what_was_left_out_is_reported(call: Call) -> None:
         "learnt   2 leaves depth 1, 1 of 2 columns, 0 s\n"
         "read     t.csv    13 rows, 2 columns, 2 classes "
         "(1 missing cell, 1 row without a class left out), 0 s\n"
-        "filled   1 row    a value is missing; what stands for it is part of the model\n"
+        "filled   1 row    a value is missing; what stands for it is part of the "
+        "model\n"
         "ignored  1 column constant or too large: same\n"
         "adjusted 2 sets   sets with a fuller window than the middle one: 1; points "
         "clipped to 1: 3; sides whose polynomial rises: 1\n"
@@ -231,8 +232,8 @@ def test_a_wrong_option_is_one_sentence(
             "(1 among 11 numbers)\n"
             "t.csv:12: column 'b' holds text where a number is needed: 'wet' "
             "(1 among 11 numbers)\n"
-            "  leave columns out with ignore (--ignore a --ignore b), or take all their "
-            "cells as categories with categorical (--categorical a --categorical b)",
+            "  leave columns out with ignore (--ignore a --ignore b), or take all "
+            "their cells as categories with categorical (--categorical a --categorical b)",
         ),
         (
             "a,grip\n1,x\n1,y\n1,x\n",
