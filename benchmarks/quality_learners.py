@@ -8,6 +8,7 @@ C5.0 to 10 leaves, the least rows of a leaf are doubled; FIGS gets fewer splits.
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +20,7 @@ from quality_tables import Table
 from sklearn.base import BaseEstimator, ClassifierMixin
 
 Make = Callable[[Table, int], Any]
+Told = Callable[[Table], dict[str, Any]]
 
 Size = tuple[float, float]
 UNKNOWN = (float("nan"), float("nan"))
@@ -127,18 +129,17 @@ class OrderedRipper:
     Each class but the most frequent one is told from those that are left.
     """
 
-    def __init__(self, is_small: bool) -> None:
-        self.is_small = is_small
+    def __init__(self, most: int | None) -> None:
+        self.most = most  # rules for each class
 
     def fit(self, values: Any, labels: tables.IntArray) -> Any:
         """Learn a set of rules for each class but one."""
         from wittgenstein import RIPPER
 
         order = np.argsort(np.bincount(labels), kind="stable")
-        most = max((MOST - 1) // (len(order) - 1), 1) if self.is_small else None
         self.steps: list[tuple[int, Any]] = []
         for code in order[:-1]:
-            ripper = RIPPER(random_state=0, max_rules=most)
+            ripper = RIPPER(random_state=0, max_rules=self.most)
             is_class = (labels == code).astype(int)
             ripper.fit(values, is_class, pos_class=1)
             self.steps.append((int(code), ripper))
@@ -152,6 +153,33 @@ class OrderedRipper:
         for code, ripper in reversed(self.steps):
             answers[np.asarray(ripper.predict(values), bool)] = code
         return answers
+
+
+def _peer(
+    path: str, told: Told | None = None, *, scaled: bool = False, **settings: Any
+) -> Make:
+    """Return what makes an estimator of a class by its path, imported when needed.
+
+    Args:
+        path: Of the class.
+        told: What it is told of the table; without it, text columns are one-hot.
+        scaled: Whether columns are brought to mean 0 and standard deviation 1.
+        settings: Of the class.
+    """
+    module, _, name = path.rpartition(".")
+
+    def make(table: Table, _leaves: int) -> Any:
+        kind = getattr(importlib.import_module(module), name)
+        if told:
+            return kind(**told(table), **settings)
+        return _prepared(table, kind(**settings), scaled=scaled)
+
+    return make
+
+
+def _columns(table: Table) -> dict[str, Any]:
+    columns = np.flatnonzero(table.is_categorical).tolist()
+    return {"categorical_features": columns or None}
 
 
 def _tree(**settings: Any) -> Make:
@@ -178,44 +206,6 @@ def _tree_size(model: Any) -> Size:
         stack += [(tree.children_left[node], columns)]
         stack += [(tree.children_right[node], columns)]
     return _size(rules)
-
-
-def _lda(table: Table, _leaves: int) -> Any:
-    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
-
-    return _prepared(table, LinearDiscriminantAnalysis(), scaled=True)
-
-
-def _logistic(table: Table, _leaves: int) -> Any:
-    from sklearn.linear_model import LogisticRegression
-
-    return _prepared(table, LogisticRegression(max_iter=1000), scaled=True)
-
-
-def _bayes(table: Table, _leaves: int) -> Any:
-    from sklearn.naive_bayes import GaussianNB
-
-    return _prepared(table, GaussianNB(), scaled=True)
-
-
-def _forest(table: Table, _leaves: int) -> Any:
-    from sklearn.ensemble import RandomForestClassifier
-
-    return _prepared(table, RandomForestClassifier(n_estimators=100, random_state=0))
-
-
-def _boosting(table: Table, _leaves: int) -> Any:
-    from sklearn.ensemble import HistGradientBoostingClassifier
-
-    return HistGradientBoostingClassifier(
-        categorical_features=table.is_categorical, random_state=0
-    )
-
-
-def _ebm(table: Table, _leaves: int) -> Any:
-    from interpret.glassbox import ExplainableBoostingClassifier
-
-    return ExplainableBoostingClassifier(outer_bags=2, n_jobs=1, random_state=0)
 
 
 def _figs(table: Table, leaves: int) -> Any:
@@ -249,8 +239,7 @@ def _c5(kind: str, *, is_small: bool = False) -> Make:
     def make(table: Table, _leaves: int) -> Any:
         import c50py
 
-        columns = np.flatnonzero(table.is_categorical).tolist()
-        fresh = partial(getattr(c50py, kind), categorical_features=columns)
+        fresh = partial(getattr(c50py, kind), **_columns(table))
         if not is_small:
             return fresh()
         more = (2**k for k in range(1, len(table.labels).bit_length()))
@@ -268,11 +257,12 @@ def _c5_size(model: Any) -> Size:
     return _size(_leaves(model.tree_, _by_name, frozenset()))
 
 
-def _ripper(*, is_small: bool = False) -> Make:
-    def make(_table: Table, _leaves: int) -> Any:
-        return OrderedRipper(is_small)
+def _ripper(table: Table, _leaves: int) -> Any:
+    return OrderedRipper(None)
 
-    return make
+
+def _small_ripper(table: Table, _leaves: int) -> Any:
+    return OrderedRipper(max((MOST - 1) // table.labels.max(), 1))
 
 
 def _ripper_size(model: OrderedRipper) -> Size:
@@ -284,17 +274,6 @@ def _ripper_size(model: OrderedRipper) -> Size:
     return _size([*rules, ()])  # the default
 
 
-def _optimal(table: Table, _leaves: int) -> Any:
-    from pystreed import STreeDClassifier
-
-    return _prepared(
-        table,
-        STreeDClassifier(
-            max_depth=4, max_num_nodes=MOST - 1, hyper_tune=True, time_limit=3600
-        ),
-    )
-
-
 def _optimal_size(model: Any) -> Size:
     def below(node: Any) -> list[Any]:
         return [] if node.is_leaf_node() else [node.left_child, node.right_child]
@@ -302,62 +281,20 @@ def _optimal_size(model: Any) -> Size:
     return _size(_leaves(model[-1].get_tree(), below, frozenset()))
 
 
-def _ferl(**settings: Any) -> Make:
-    def make(table: Table, _leaves: int) -> Any:
-        from ex_fuzzy import FERL
-
-        return _prepared(table, FERL(random_state=0, **settings))
-
-    return make
-
-
 def _ferl_size(model: Any) -> Size:
     return _size(leaf["path_features"] for leaf in model[-1]._extract_leaves())
-
-
-def _fuzzy_rules(**settings: Any) -> Make:
-    def make(table: Table, _leaves: int) -> Any:
-        from ex_fuzzy import FuzzyRulesClassifier
-
-        return _prepared(table, FuzzyRulesClassifier(random_state=0, **settings))
-
-    return make
 
 
 def _fuzzy_rules_size(model: Any) -> Size:
     return _size([*model[-1]._rules["features"], ()])  # the default
 
 
-def _fuzzydtree(**settings: Any) -> Make:
-    def make(table: Table, _leaves: int) -> Any:
-        from fuzzydtree import FuzzyTreeClassifier
-
-        columns = np.flatnonzero(table.is_categorical).tolist() or None
-        return FuzzyTreeClassifier(
-            random_state=0, categorical_features=columns, **settings
-        )
-
-    return make
-
-
 def _fuzzydtree_size(model: Any) -> Size:
     return _size(_leaves(model.tree_, _left_and_right, frozenset()))
 
 
-def _htsk(table: Table, _leaves: int) -> Any:
-    from highfis import HTSKClassifier
-
-    return _prepared(table, HTSKClassifier(random_state=0), scaled=True)
-
-
 def _htsk_size(model: Any) -> Size:
     return float(model[-1].model_.n_rules), float(model[-1].n_features_in_)
-
-
-def _farc(table: Table, _leaves: int) -> Any:
-    from farc_hd.FarcHDClassifier import FarcHDClassifier
-
-    return FarcHDClassifier(categorical_variables=table.is_categorical.tolist())
 
 
 def _farc_size(model: Any) -> Size:
@@ -413,26 +350,68 @@ LEARNERS: dict[str, Learner] = {
     "DecisionTree of as many leaves as one column": Learner(
         _tree(), _tree_size, like="fuzzytree, one column"
     ),
-    "GaussianNB": Learner(_bayes),
-    "LDA": Learner(_lda),
-    "logistic regression": Learner(_logistic),
-    "random forest": Learner(_forest),
-    "histogram boosting": Learner(_boosting),
-    "EBM": Learner(_ebm, takes_frame=True, package="interpret"),
+    "GaussianNB": Learner(_peer("sklearn.naive_bayes.GaussianNB", scaled=True)),
+    "LDA": Learner(
+        _peer("sklearn.discriminant_analysis.LinearDiscriminantAnalysis", scaled=True)
+    ),
+    "logistic regression": Learner(
+        _peer("sklearn.linear_model.LogisticRegression", scaled=True, max_iter=1000)
+    ),
+    "random forest": Learner(
+        _peer(
+            "sklearn.ensemble.RandomForestClassifier", n_estimators=100, random_state=0
+        )
+    ),
+    "histogram boosting": Learner(
+        _peer(
+            "sklearn.ensemble.HistGradientBoostingClassifier", _columns, random_state=0
+        )
+    ),
+    "EBM": Learner(
+        _peer(
+            "interpret.glassbox.ExplainableBoostingClassifier",
+            lambda _table: {},
+            outer_bags=2,
+            n_jobs=1,
+            random_state=0,
+        ),
+        takes_frame=True,
+        package="interpret",
+    ),
     "FIGS": Learner(_figs, _in_pipeline(_figs_size), package="imodels"),
     "FIGS of as many leaves as one column": Learner(
         _figs, _in_pipeline(_figs_size), like="fuzzytree, one column", package="imodels"
     ),
     "C5.0": Learner(_c5("C5Classifier"), _c5_size, package="c50py"),
     "C5.0 rules": Learner(_c5("C5RulesClassifier"), _c5_size, package="c50py"),
-    "RIPPER": Learner(
-        _ripper(), _ripper_size, takes_frame=True, package="wittgenstein"
+    "RIPPER": Learner(_ripper, _ripper_size, takes_frame=True, package="wittgenstein"),
+    "FERL": Learner(
+        _peer("ex_fuzzy.FERL", random_state=0), _ferl_size, package="ex-fuzzy"
     ),
-    "FERL": Learner(_ferl(), _ferl_size, package="ex-fuzzy"),
-    "FuzzyRules": Learner(_fuzzy_rules(), _fuzzy_rules_size, package="ex-fuzzy"),
-    "fuzzydtree": Learner(_fuzzydtree(), _fuzzydtree_size, package="fuzzydtree"),
-    "HTSK": Learner(_htsk, _htsk_size, is_small=True, package="highfis"),
-    "FARC-HD": Learner(_farc, _farc_size, package="farc-hd"),
+    "FuzzyRules": Learner(
+        _peer("ex_fuzzy.FuzzyRulesClassifier", random_state=0),
+        _fuzzy_rules_size,
+        package="ex-fuzzy",
+    ),
+    "fuzzydtree": Learner(
+        _peer("fuzzydtree.FuzzyTreeClassifier", _columns, random_state=0),
+        _fuzzydtree_size,
+        package="fuzzydtree",
+    ),
+    "HTSK": Learner(
+        _peer("highfis.HTSKClassifier", scaled=True, random_state=0),
+        _htsk_size,
+        is_small=True,
+        package="highfis",
+    ),
+    "FARC-HD": Learner(
+        _peer(
+            "farc_hd.FarcHDClassifier.FarcHDClassifier",
+            lambda table: {"categorical_variables": table.is_categorical.tolist()},
+        ),
+        _farc_size,
+        package="farc-hd",
+    ),
     "DecisionTree, 10 leaves": Learner(
         _tree(max_leaf_nodes=MOST), _tree_size, is_small=True
     ),
@@ -449,26 +428,40 @@ LEARNERS: dict[str, Learner] = {
         package="c50py",
     ),
     "RIPPER, 10 rules": Learner(
-        _ripper(is_small=True),
+        _small_ripper,
         _ripper_size,
         is_small=True,
         takes_frame=True,
         package="wittgenstein",
     ),
     "optimal tree, 10 leaves": Learner(
-        _optimal, _optimal_size, is_small=True, package="pystreed"
+        _peer(
+            "pystreed.STreeDClassifier",
+            max_depth=4,
+            max_num_nodes=MOST - 1,
+            hyper_tune=True,
+            time_limit=3600,
+        ),
+        _optimal_size,
+        is_small=True,
+        package="pystreed",
     ),
     "FERL, 10 rules": Learner(
-        _ferl(max_rules=MOST), _ferl_size, is_small=True, package="ex-fuzzy"
+        _peer("ex_fuzzy.FERL", random_state=0, max_rules=MOST),
+        _ferl_size,
+        is_small=True,
+        package="ex-fuzzy",
     ),
     "FuzzyRules, 10 rules": Learner(
-        _fuzzy_rules(nRules=MOST - 1),
+        _peer("ex_fuzzy.FuzzyRulesClassifier", random_state=0, nRules=MOST - 1),
         _fuzzy_rules_size,
         is_small=True,
         package="ex-fuzzy",
     ),
     "fuzzydtree, 10 leaves": Learner(
-        _fuzzydtree(max_leaves=MOST),
+        _peer(
+            "fuzzydtree.FuzzyTreeClassifier", _columns, random_state=0, max_leaves=MOST
+        ),
         _fuzzydtree_size,
         is_small=True,
         package="fuzzydtree",
