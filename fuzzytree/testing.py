@@ -124,6 +124,9 @@ def exporter_models(seed: int = 0, rounds: int = 2) -> Iterator[tuple[str, Docum
         for kind in ("relative", "raw"):
             rules = rules_from_tree(tree, kind)
             yield f"{kind} rules of random_tree({number})", rules
+        yield f"rated tree of random_tree({number})", rated(tree, number)
+        more = rated(rules_from_tree(tree), number)
+        yield f"rated rules of random_tree({number})", more
         points = with_points(rules_from_tree(tree, conjunction="product"), number)
         yield f"with_points of random_tree({number})", points
     for number in range(seed, seed + 2 * rounds):

@@ -38,12 +38,14 @@ from fuzzytree.semantics import forms, rules_from_tree
 _MOST_ROWS: Final = 2_000  # that a program answers
 _LONGEST: Final = 80  # characters of a line
 _FLOAT32: Final = {"dtype": "float32"}
+_RATED: Final = {"probabilities": True}
 _OPTIONS: Final[Mapping[str, tuple[Options, ...]]] = {
-    "c": ({}, _FLOAT32),
-    "javascript": ({}, {"module": "script"}),
-    "pmml": ({}, {"curves": "points"}),
+    "c": ({}, _FLOAT32, _RATED, {**_FLOAT32, **_RATED}),
+    "javascript": ({}, {"module": "script"}, _RATED, {"module": "script", **_RATED}),
+    "pmml": ({}, {"curves": "points"}, _RATED, {"curves": "points", **_RATED}),
     "sql": tuple(
-        {"dialect": dialect, "strengths": has_strengths}
+        {"dialect": dialect, "strengths": has_strengths, "probabilities": is_rated}
+        for is_rated in (False, True)
         for dialect in ("sqlite", "duckdb", "postgresql", "spark")
         for has_strengths in (False, True)
     ),
@@ -181,7 +183,7 @@ def _run(
     """Run a program, and compare its answers with those of the form it was made of."""
     model = cast("Model", text.form)  # no system: see `_why_not`
     some = rows.part(slice(None, None, -(-len(rows.numbers) // _MOST_ROWS)))
-    is_single = text.options == _FLOAT32
+    is_single = text.options.get("dtype") == "float32"
     base = native_base(model, "float32" if is_single else "float64", some)
     try:
         result = ENGINES[program.format](

@@ -73,15 +73,24 @@ def winners(
     return result
 
 
-def outcome_of(model: Model, rows: Sequence[Sequence[float | None]]) -> Outcome:
+def outcome_of(
+    model: Model,
+    rows: Sequence[Sequence[float | None]],
+    *,
+    has_probabilities: bool = False,
+) -> Outcome:
     """Return rows of a rule, a status and any strengths, None for NaN, as an outcome.
+
+    The probabilities of all classes may stand behind them.
 
     Raises:
         FuzzyTreeError: If there are more or fewer strengths than rules.
     """
     count = len(model.rules) if isinstance(model, RuleBase) else 0
-    width = len(rows[0]) if rows else 2 + count
-    table = np.array(rows, np.float64).reshape(len(rows), width)
+    rated = len(model.classes) if has_probabilities else 0
+    width = len(rows[0]) if rows else 2 + count + rated
+    whole = np.array(rows, np.float64).reshape(len(rows), width)
+    table, probabilities = whole[:, : width - rated], whole[:, width - rated :].T
     if table.shape[1] not in (2, 2 + count):
         raise FuzzyTreeError(f"it gives {table.shape[1] - 2} strengths, not {count}")
     strengths = table[:, 2:].T if table.shape[1] > 2 else None
@@ -93,7 +102,7 @@ def outcome_of(model: Model, rows: Sequence[Sequence[float | None]]) -> Outcome:
         if not np.isin(numbers, np.arange(most + 1)).all():
             raise FuzzyTreeError(f"it answers a {what} that is none of 0 to {most}")
     rule, status = table[:, :2].T.astype(np.int64)
-    return Outcome(rule, status, strengths)
+    return Outcome(rule, status, strengths, probabilities if rated else None)
 
 
 def _shown(names: Sequence[str]) -> str:

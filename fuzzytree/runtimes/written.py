@@ -67,7 +67,8 @@ import { readFileSync, writeFileSync } from "node:fs";
 import { answer } from "./model.mjs";
 const { width, count, classes } = JSON.parse(readFileSync("facts.json", "utf-8"));
 const kept = (found) => found.outputs === undefined
-  ? [classes.indexOf(found.label), found.rule, found.status, ...(found.strengths ?? [])]
+  ? [classes.indexOf(found.label), found.rule, found.status,
+    ...(found.strengths ?? []), ...(found.probabilities ?? [])]
   : [...found.outputs, found.status, ...found.activations];
 const bytes = readFileSync("rows.bin");
 const rows = new Float64Array(bytes.buffer, bytes.byteOffset, bytes.length / 8);
@@ -91,8 +92,9 @@ def numbers_of(
         classes: Of the model; none for a fuzzy system.
 
     Returns:
-        For each row the place of the class, the rule, the status and all strengths;
-        of a system its outputs, the status and all activations.
+        For each row the place of the class, the rule, the status, all strengths, and
+        all probabilities if the program has them; of a system its outputs, the status
+        and all activations.
 
     Raises:
         MissingExtraError: If node is not installed.
@@ -132,13 +134,19 @@ def numbers_of(
 
 def _script(language: str) -> Engine:
     def run(
-        content: bytes, model: Model, _: Options, values: FloatArray
+        content: bytes, model: Model, options: Options, values: FloatArray
     ) -> ProgramOutcome:
         result = numbers_of(content, language, values, model.classes)
         labels = tuple(None if k < 0 else model.classes[int(k)] for k in result[:, 0])
-        return ProgramOutcome(outcome_of(model, result[:, 1:].tolist()), labels)
+        rows = result[:, 1:].tolist()
+        outcome = outcome_of(model, rows, has_probabilities=_is_rated(options))
+        return ProgramOutcome(outcome, labels)
 
     return run
+
+
+def _is_rated(options: Options) -> bool:
+    return options.get("probabilities") is True
 
 
 def _c(
@@ -162,7 +170,14 @@ def _sql(
         connection, failure = sqlite3.connect(":memory:"), sqlite3.Error
     kind = "DOUBLE" if dialect == "duckdb" else "REAL"
     try:
-        return _queried(connection, content, model, kind, values)
+        return _queried(
+            connection,
+            content,
+            model,
+            kind,
+            values,
+            has_probabilities=_is_rated(options),
+        )
     except failure as error:
         text = f"{dialect} cannot run it: {str(error).splitlines()[0]}"
         raise FuzzyTreeError(text) from error
@@ -171,7 +186,13 @@ def _sql(
 
 
 def _queried(
-    connection: Any, content: bytes, model: Model, kind: str, values: FloatArray
+    connection: Any,
+    content: bytes,
+    model: Model,
+    kind: str,
+    values: FloatArray,
+    *,
+    has_probabilities: bool,
 ) -> ProgramOutcome:
     quoted = ['"' + name.replace('"', '""') + '"' for name in model.inputs]
     columns = ", ".join(f"{name} {kind}" for name in quoted)
@@ -184,12 +205,13 @@ def _queried(
     kept = np.array([row[:width] for row in result], np.float64).reshape(-1, width)
     if not np.array_equal(kept, values.T, equal_nan=True):
         raise FuzzyTreeError("it does not give each row with its inputs, in order")
-    outcome = outcome_of(model, [row[width + 1 :] for row in result])
+    rows = [row[width + 1 :] for row in result]
+    outcome = outcome_of(model, rows, has_probabilities=has_probabilities)
     return ProgramOutcome(outcome, tuple(row[width] for row in result))
 
 
 def _pmml(
-    content: bytes, model: Model, _: Options, values: FloatArray
+    content: bytes, model: Model, options: Options, values: FloatArray
 ) -> ProgramOutcome:
     for package in ("jpmml_evaluator", "pandas"):
         _need(package, "running PMML")
@@ -203,6 +225,8 @@ def _pmml(
     labels = tuple(None if one != one else one for one in result["answer"])
     count = len(model.rules) if isinstance(model, RuleBase) else 0
     names = [f"strength of rule {k}" for k in range(1, count + 1)]
+    is_rated = _is_rated(options)
+    shares = [f"probability of class {c}" for c in model.classes if is_rated]
     known = np.logical_and.reduce(np.isfinite(values), axis=0).tolist()
     rows = []
     for place, line in enumerate(result.to_dict("records")):
@@ -210,8 +234,11 @@ def _pmml(
         rule = 0 if is_none else int(line["rule"])
         status = Status.DECIDED if rule else Status.UNCOVERED
         fired = [line[name] if known[place] else math.nan for name in names]
-        rows.append([rule, status if known[place] else Status.MISSING, *fired])
-    return ProgramOutcome(outcome_of(model, rows), labels, has_status=False)
+        rated = [line[name] if rule else math.nan for name in shares]
+        status = status if known[place] else Status.MISSING
+        rows.append([rule, status, *fired, *rated])
+    outcome = outcome_of(model, rows, has_probabilities=is_rated)
+    return ProgramOutcome(outcome, labels, has_status=False)
 
 
 def _need(package: str, purpose: str) -> None:

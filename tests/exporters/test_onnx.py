@@ -319,7 +319,7 @@ def test_wrong_options_are_refused_by_name() -> None:
         "signature: there is needed, all, not 'some'"
     )
     assert refused(rules, outputs=("label", "score")) == (
-        "outputs: there is label, rule, strengths, status, not 'score'"
+        "outputs: there is label, rule, strengths, status, probabilities, not 'score'"
     )
     assert refused(rules, outputs=()) == (
         "outputs: name each once, at least one, not ()"

@@ -173,7 +173,7 @@ def test_a_system_s_outputs_are_no_model_s() -> None:
     from fuzzytree.testing import random_tree
 
     with pytest.raises(
-        ValueError, match="there is label, rule, strengths, status, not"
+        ValueError, match="there is label, rule, strengths, status, probabilities, not"
     ):
         write_onnx(random_tree(1), outputs=("outputs",))
 

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from fuzzytree.checking.comparing import ModelRun, compare_bits, probed
+from fuzzytree.checking.programs import ProgramFile, check_program
 from fuzzytree.exporters import c, javascript, pmml, sql
 from fuzzytree.exporters.onnx import write_onnx
+from fuzzytree.model.agreement import Comparison
 from fuzzytree.runtimes import native
 from fuzzytree.runtimes.mixing import class_probabilities
 from fuzzytree.runtimes.onnxruntime import open_onnx, prepare
@@ -99,14 +101,10 @@ def test_a_comparison_finds_other_probabilities(seed: int) -> None:
 def test_javascript_returns_them(seed: int, tmp_path: Path) -> None:
     rules = rules_of(seed)
     content = javascript.write(rules, probabilities=True).content
-    shown = content.replace(
-        b"strengths: strengths.slice(0, ", b"unused: strengths.slice(0, "
-    )
-    shown = shown.replace(b", probabilities: ", b", strengths: ")
     values = rows_for(rules)
-    result = numbers_of(shown, "javascript", values, rules.classes)
+    result = numbers_of(content, "javascript", values, rules.classes)
     right = expected(rules, values)
-    assert np.array_equal(result[:, 3:].T, right, equal_nan=True)
+    assert np.array_equal(result[:, 3 + len(rules.rules) :].T, right, equal_nan=True)
     path = tmp_path / "model.mjs"
     path.write_bytes(content)
     done = subprocess.run(["node", path], capture_output=True, text=True, check=False)
@@ -196,3 +194,34 @@ def test_pmml_has_an_output_for_each_class(seed: int) -> None:
     found = evaluator.evaluateAll(table, error_col=None)[0]
     names = [f"probability of class {name}" for name in rules.classes]
     assert np.array_equal(found[names].to_numpy(np.float64).T, expected(rules, values))
+
+
+PROGRAMS = [
+    ("c", c.write_c, {}),
+    ("javascript", javascript.write, {}),
+    ("sql", sql.write, {}),
+    ("sql", sql.write, {"dialect": "duckdb", "strengths": True}),
+    pytest.param("pmml", pmml.write, {}, marks=pytest.mark.heavy),
+]
+
+
+@pytest.mark.parametrize(("name", "write", "options"), PROGRAMS)
+def test_check_runs_programs_with_probabilities(
+    name: str, write: Any, options: dict[str, Any]
+) -> None:
+    if name == "pmml":
+        pytest.importorskip("jpmml_evaluator")
+    rules = rules_of(1)
+    content = write(rules, probabilities=True, **options).content
+    rows = probed(rules, None, 40)
+    found = [*check_program("it", ProgramFile(name, content), rules, rows)]
+    assert [one.verdict for one in found if isinstance(one, Comparison)][:2] == [
+        "agrees",
+        "agrees",
+    ]
+    other = write(rated(rules, 9), probabilities=True, **options).content
+    wrong = [*check_program("it", ProgramFile(name, other, True), rules, rows)]
+    verdicts = [one.verdict for one in wrong if isinstance(one, Comparison)]
+    assert verdicts[0] in ("DISAGREES", "rows only")
+    if name in ("javascript", "sql"):
+        assert "DISAGREES" in verdicts[1:]

@@ -38,9 +38,10 @@ def test_the_first_example_is_a_whole_file() -> None:
 
 
 def test_every_other_example_fits_the_layout() -> None:
-    _, size, points, sentences, rated, nodes_and_leaves, sets = BLOCKS
+    _, size, island, points, sentences, rated, nodes_and_leaves, sets = BLOCKS
     bound: list[tuple[Node, type[layout.FileRecord]]] = [
         *((item, layout.VariableOfModel) for item in items(size)),
+        *((item, layout.VariableOfModel) for item in items(island)),
         *((item, layout.TermOfVariable) for item in items(points)),
         *((item, layout.RuleOfModel) for item in items(rated, "rules")),
         *((item, layout.NodeOfTree) for item in items(nodes_and_leaves, "nodes")),

@@ -77,6 +77,25 @@ def _head_drafts(old: RuleBase, new: RuleBase, result: Matching) -> Iterator[Dra
         was, now = zip(*moved, strict=True)
         draft = Draft("support", text, "never", old_rules=was, new_rules=now)
         yield draft._replace(is_harmless=True)
+    yield from _rated_drafts(old, new, result)
+
+
+def _rated_drafts(old: RuleBase, new: RuleBase, result: Matching) -> Iterator[Draft]:
+    """Yield that probabilities of classes changed, which decide no class."""
+    moved = [
+        (match.old, match.new)
+        for match in result.matches
+        if old.rules[match.old - 1].probabilities
+        != new.rules[match.new - 1].probabilities
+    ]
+    if moved or old.semantics.sharpness != new.semantics.sharpness:
+        count = "1 rule has" if len(moved) == 1 else f"{len(moved)} rules have"
+        text = f"{count} other probabilities of classes"
+        if old.semantics.sharpness != new.semantics.sharpness:
+            text += f"; the sharpness is {new.semantics.sharpness or 'none'}"
+            text += f", and was {old.semantics.sharpness or 'none'}"
+        was, now = zip(*moved, strict=True) if moved else ((), ())
+        yield Draft("support", text, "never", old_rules=was, new_rules=now)
 
 
 # --- classes and answers
