@@ -27,6 +27,7 @@ from fuzzytree.model import (
     fingerprint,
     kind_of,
     narrowing_refusal,
+    stand_ins,
 )
 from fuzzytree.semantics import from_rules, from_system
 
@@ -362,6 +363,10 @@ def _facts(
         "semantics": semantics,
         **names,
     }
+    if known := {v.name: v.categories for v in model.variables if v.categories}:
+        records["categories"] = known
+    if stand := stand_ins(model.variables):
+        records["stand_ins"] = stand
     return texts | {
         key: json.dumps(value, ensure_ascii=False) for key, value in records.items()
     }

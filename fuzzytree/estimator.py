@@ -6,15 +6,23 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
 
+import narwhals as nw
 import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.cells import numbers_only
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import ArrayLearner, LearningReport, LearningSettings
-from fuzzytree.model import FuzzyTree, label_type_of, with_label_type
+from fuzzytree.model import (
+    DATE_UNIT,
+    FuzzyTree,
+    Variable,
+    label_type_of,
+    with_label_type,
+)
 from fuzzytree.runtimes import baseline, class_probabilities
 from fuzzytree.semantics import Status, rules_from_tree
+from fuzzytree.tables import batches, read_table
 
 try:
     from sklearn.base import BaseEstimator, ClassifierMixin
@@ -44,6 +52,47 @@ def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
     return validate_data(estimator, table, *map(_unmasked_labels, y), **options)
 
 
+def _as_numbers(
+    X: Any, variables: Sequence[Variable] | None = None
+) -> tuple[Any, dict[str, tuple[str, ...]], tuple[str, ...]]:
+    """Return a frame with numbers in the place of texts, truth values and dates.
+
+    Args:
+        X: A frame, or anything else, which comes back as it is.
+        variables: Those of the tree; None to learn what the columns are.
+
+    Returns:
+        The frame, and when learning the categories by column and the columns of dates.
+    """
+    try:
+        frame = nw.from_native(X, eager_only=True)
+    except TypeError:
+        return X, {}, ()
+    names = [name for name in frame.columns if not frame[name].dtype.is_numeric()]
+    if not names or len(set(frame.columns)) < len(frame.columns):
+        return X, {}, ()
+    title, values = "X", dict.fromkeys(map(str, names), np.zeros(len(frame)))
+    categories: dict[str, tuple[str, ...]] = {}
+    dates: tuple[str, ...] = ()
+    cells = frame.select(names).to_native()
+    if variables is None:
+        table = read_table(cells, target=np.zeros(len(frame)), name=title)
+        values |= dict(zip(table.columns, table.values, strict=True))
+        categories, dates = dict(table.categories), table.dates
+    else:
+        known = {v.name: v for v in variables if not v.parts}
+        used = [name for name in map(str, names) if name in known]
+        for batch in batches(cells, used, variables=[known[n] for n in used]):
+            values |= dict(zip(used, batch.values, strict=True))
+    numbers = [
+        nw.new_series(name, values[str(name)], nw.Float64, backend=frame.implementation)
+        for name in names
+    ]
+    if hasattr(X, "index"):  # of pandas, which aligns columns by it
+        numbers = [nw.maybe_set_index(one, index=X.index) for one in numbers]
+    return frame.with_columns(*numbers).to_native(), categories, dates
+
+
 def _unmasked_labels(y: Any) -> Any:
     if np.ma.is_masked(y):
         raise ValueError("y holds masked labels")
@@ -54,11 +103,11 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     """Learn a fuzzy decision tree and answer by it.
 
     Class k of the tree is named `str(classes_[k])`; its columns are those of the
-    table it was fitted on, or `x1`, `x2`, ... Missing values are refused, as
-    scikit-learn expects of a classifier without the tag `allow_nan`; `ft.learn` drops
-    and counts such rows instead. Sample weights are not supported. A pickle or a copy
-    of a fitted classifier holds its tree, with the range of each column and the centre
-    of each combination, and no training rows.
+    table it was fitted on, or `x1`, `x2`, ... Frames may have columns of text,
+    categories, truth values and dates. Missing values are learnt from and answered;
+    paper mode refuses them. Sample weights are not supported. A pickle or a copy of a
+    fitted classifier holds its tree, with the range of each column and the centre of
+    each combination, and no training rows.
 
     Args:
         mode: `default`, or `paper` for the paper's algorithm to the letter.
@@ -142,11 +191,14 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             ValueError: If the table has one row, one class or no varying column, or
                 a setting is out of its range.
         """
-        values, labels = _validated(self, X, y, dtype=np.float64)
+        X, categories, dates = _as_numbers(X)
+        values, labels = _validated(
+            self, X, y, dtype=np.float64, ensure_all_finite=self._finite()
+        )
         check_classification_targets(labels)
         if len(values) == 1:
             raise ValueError("cannot learn from one sample (n_samples = 1)")
-        self._start(np.unique(labels))
+        self._start(np.unique(labels), categories, dates)
         return self._learn(values, labels)
 
     def partial_fit(
@@ -177,7 +229,14 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 "a pickled or copied classifier holds no training rows, so partial_fit "
                 "cannot continue; call fit, or partial_fit on the original"
             )
-        values, labels = _validated(self, X, y, dtype=np.float64, reset=is_first)
+        values, labels = _validated(
+            self,
+            X,
+            y,
+            dtype=np.float64,
+            reset=is_first,
+            ensure_all_finite=self._finite(),
+        )
         check_classification_targets(labels)
         if is_first:
             if classes is None:
@@ -190,11 +249,31 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             )
         return self._learn(values, labels)
 
-    def _start(self, classes: LabelArray) -> None:
+    def _finite(self) -> bool | str:
+        """Return which numbers scikit-learn's check takes."""
+        return True if self.mode == "paper" else "allow-nan"
+
+    def __sklearn_tags__(self) -> Any:
+        """Say that missing values are learnt from, but in paper mode."""
+        tags: Any = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = self.mode != "paper"
+        return tags
+
+    def _start(
+        self,
+        classes: LabelArray,
+        categories: Mapping[str, tuple[str, ...]] | None = None,
+        dates: Sequence[str] = (),
+    ) -> None:
         self.classes_ = classes
         names = [str(label) for label in classes]
-        settings = self._settings()
-        self._learner = ArrayLearner(self._columns(), names, settings=settings)
+        self._learner = ArrayLearner(
+            self._columns(),
+            names,
+            dict.fromkeys(dates, DATE_UNIT),
+            settings=self._settings(),
+            categories=categories or {},
+        )
 
     def _learn(self, values: FloatArray, labels: LabelArray) -> Self:
         self._learner.partial_fit(values, np.searchsorted(self.classes_, labels))
@@ -294,7 +373,10 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _values(self, X: npt.ArrayLike) -> FloatArray:
         """Return the columns that the tree needs, shape (inputs, rows)."""
         check_is_fitted(self)
-        values: FloatArray = _validated(self, X, reset=False, dtype=np.float64)
+        X, _, _ = _as_numbers(X, self.tree_.variables)
+        values: FloatArray = _validated(
+            self, X, reset=False, dtype=np.float64, ensure_all_finite=self._finite()
+        )
         position = {name: k for k, name in enumerate(self._columns())}
         return values.T[[position[name] for name in self.tree_.inputs]]
 

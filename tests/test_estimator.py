@@ -22,6 +22,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
+import fuzzytree as ft
 from fuzzytree.errors import MissingExtraError
 from fuzzytree.estimator import FuzzyTreeClassifier, Mode
 from fuzzytree.model.rulebase import Band, Part, Term, Variable
@@ -215,10 +216,36 @@ def test_a_row_that_overflows_a_combination_is_named() -> None:
     )
 
 
-def test_missing_values_are_refused() -> None:
-    model = FuzzyTreeClassifier().fit(WINE.data, WINE.target)
+def test_missing_values_are_refused_in_paper_mode() -> None:
+    model = FuzzyTreeClassifier(mode="paper").fit(WINE.data, WINE.target)
     with pytest.raises(ValueError, match="Input X contains NaN"):
         model.predict(pd.DataFrame([[np.nan] * 13], columns=WINE.data.columns))
+
+
+def test_a_frame_may_have_texts_dates_and_missing_values() -> None:
+    rows = 40
+    table = pd.DataFrame(
+        {
+            "island": pd.Categorical(["Biscoe", "Dream", "Torgersen", "Dream"] * 10),
+            "seen": pd.to_datetime("2020-01-01") + pd.to_timedelta(range(rows), "D"),
+            "is wild": [True, False] * 20,
+            "bill": [1.0, np.nan] * 20,
+        },
+        index=range(5, 5 + rows),
+    )
+    labels = np.array([0, 1, 1, 0] * 10)
+    model = FuzzyTreeClassifier().fit(table, labels)
+    known = {v.name: v for v in model.tree_.variables if not v.parts}
+    assert all(v.missing is not None for v in known.values())
+    assert {v.categories for v in known.values()} <= {
+        ("Biscoe", "Dream", "Torgersen"),
+        ("False", "True"),
+        (),
+    }
+    found = model.predict(table).tolist()
+    assert ft.run(model.tree_, table).classes == found
+    table["island"] = "Mars"
+    assert len(model.predict(table)) == rows
 
 
 def test_without_scikit_learn_the_classifier_says_what_installs_it(
@@ -235,16 +262,15 @@ def test_without_scikit_learn_the_classifier_says_what_installs_it(
 
 def test_masked_cells_and_times_are_no_numbers_to_the_classifier() -> None:
     values, labels = np.array([[1.0], [1.5], [7.0], [8.0]]), [0, 0, 1, 1]
-    model = FuzzyTreeClassifier().fit(values, labels)
+    model = FuzzyTreeClassifier(mode="paper").fit(values, labels)
     masked = np.ma.MaskedArray(values, [[True], [False], [False], [False]])
     for call in (model.predict, lambda rows: model.fit(rows, labels)):
         with pytest.raises(ValueError, match="Input X contains NaN"):
             call(masked)
         times = values.astype("datetime64[s]")
-        for wrong in (times, pd.DataFrame(times)):
-            with pytest.raises(
-                ValueError, match=r"^X holds datetime64\[s\], and no numbers$"
-            ):
-                call(wrong)
+        with pytest.raises(
+            ValueError, match=r"^X holds datetime64\[s\], and no numbers$"
+        ):
+            call(times)
     with pytest.raises(ValueError, match=r"^y holds masked labels$"):
         model.fit(values, np.ma.MaskedArray(labels, [True, False, False, False]))

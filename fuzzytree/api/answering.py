@@ -325,7 +325,9 @@ def _answering_onnx(
             probabilities=outcome.probabilities,
         )
 
-    return Answering(model.inputs, model.columns, answer, is_parallel=True)
+    return Answering(
+        model.inputs, model.columns, answer, is_parallel=True, variables=model.variables
+    )
 
 
 def _runtime(name: str, model: Document) -> Runtime:

@@ -7,6 +7,7 @@ fit the cache, nothing on stderr.
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,7 @@ from fuzzytree.model import (
     Semantics,
     SystemOutcome,
     SystemRun,
+    Variable,
     text_fault,
 )
 from fuzzytree.runtimes.rows import checked
@@ -68,6 +70,8 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
         semantics: What an answer depends on beside rules or tree.
         names: Of the numbers in the output `outputs` of a fuzzy system.
         chunk: How many rows are best run together; 0 if unknown.
+        categories: Those of inputs that are their positions.
+        stand_ins: What the graph puts in the place of missing values, by input.
     """
 
     name: str
@@ -85,6 +89,28 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     semantics: Semantics
     names: tuple[str, ...] = ()
     chunk: int = 0
+    categories: dict[str, tuple[str, ...]] = {}
+    stand_ins: dict[str, float] = {}
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """The inputs, which say what cells mean."""
+        units = dict(zip(self.columns, self.units, strict=False))
+        return tuple(
+            Variable(
+                name,
+                unit=units.get(name, ""),
+                categories=self.categories.get(name, ()),
+                missing=self.stand_ins.get(name),
+            )
+            for name in self.inputs
+        )
+
+    def known(self, values: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return which rows, of shape (inputs, rows), have all values."""
+        replaced = np.array([[name in self.stand_ins] for name in self.inputs])
+        known: npt.NDArray[np.bool_] = (np.isfinite(values) | replaced).all(axis=0)
+        return known
 
 
 class OnnxModel(Facts, frozen=True, kw_only=True):
@@ -268,7 +294,7 @@ def _runner(bare: exporters.Bare, facts: Facts) -> Run:
 
     def run(values: FloatArray) -> Outcome:
         values = checked(values, facts.inputs)
-        return _outcome(call(values), values)
+        return _outcome(call(values), facts, values)
 
     return run
 
@@ -282,17 +308,17 @@ def _labelled_runner(
         values = checked(values, facts.inputs)
         outputs = call(values)
         labels = tuple([label or None for label in outputs["label"].tolist()])
-        return _outcome(outputs, values), labels
+        return _outcome(outputs, facts, values), labels
 
     return run
 
 
-def _outcome(outputs: Outputs, values: FloatArray) -> Outcome:
+def _outcome(outputs: Outputs, facts: Facts, values: FloatArray) -> Outcome:
     rule, status = outputs["rule"], outputs.get("status")
     if status is None:
         status = np.zeros(len(rule), np.int64)
         if not (rule.item() if len(rule) == 1 else rule.all()):
-            none = np.where(np.isfinite(values).all(axis=0), 2, 3)
+            none = np.where(facts.known(values), 2, 3)
             status = np.where(rule > 0, 0, none)
     rated = outputs.get("probabilities")
     return Outcome(rule, status, outputs.get("strengths"), rated)
@@ -449,7 +475,7 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
     if other is not None:
         raise ReadError(f"{name}: the file takes {other}")
     records = {"columns", "inputs", "units", "classes", "rules", "outputs", "semantics"}
-    records |= {"names", "chunk"}
+    records |= {"names", "chunk", "categories", "stand_ins"}
     try:
         known = {k: json.loads(v) if k in records else v for k, v in texts.items()}
         facts = msgspec.convert(known, Facts)
@@ -461,6 +487,7 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
     if not set(facts.inputs) <= set(facts.columns) or not is_possible:
         raise ReadError(f"{name}: the file's metadata contradicts itself")
     names = (*facts.columns, *facts.units, *facts.classes, *facts.names)
+    names += tuple(itertools.chain(*facts.categories.values()))
     for text in (facts.name, facts.kind, facts.fingerprint, facts.version, *names):
         if fault := text_fault(text):
             raise ReadError(f"{name}: the file's metadata: {text!r} {fault}")

@@ -233,7 +233,8 @@ def test_a_wrong_option_is_one_sentence(
             "t.csv:12: column 'b' holds text where a number is needed: 'wet' "
             "(1 among 11 numbers)\n"
             "  leave columns out with ignore (--ignore a --ignore b), or take all "
-            "their cells as categories with categorical (--categorical a --categorical b)",
+            "their cells as categories with categorical (--categorical a --categorical "
+            "b)",
         ),
         (
             "a,grip\n1,x\n1,y\n1,x\n",

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
+import sqlite3
+from pathlib import Path
+from typing import Any, Literal
 
+import duckdb
 import numpy as np
+import pandas as pd
+import polars as pl
 import pytest
 from msgspec.structs import replace
 
+import fuzzytree as ft
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.exporters import yaml
+from fuzzytree.exporters import sql, yaml
 from fuzzytree.formats import read_yaml
 from fuzzytree.model import FuzzyTree, Part, RuleBase, Variable, fingerprint
 from fuzzytree.numerics import decide, exact_answer, strength_bounds
@@ -97,3 +104,42 @@ def test_a_sum_has_no_categories() -> None:
     mixed = Variable("s", parts=(Part("a", 1.0),), missing=1.0)
     with pytest.raises(InvalidModelError, match="only an input has categories"):
         RuleBase("r", ("k",), (Variable("a"), mixed), ())
+
+
+def test_an_onnx_file_and_engines_take_the_texts_of_a_table(tmp_path: Path) -> None:
+    table = pd.DataFrame(
+        {"island": ["Biscoe", " Dream", "Mars", None], "bill": [1.0, 3.0, 1.0, None]}
+    )
+    tree = everyday_tree()
+    expected = ["Adelie", "Gentoo", "Adelie", "Adelie"]
+    assert ft.run(tree, table).classes == expected
+    (tmp_path / "p.onnx").write_bytes(ft.export(tree, "onnx").content)
+    found_by_onnx = ft.run(tmp_path / "p.onnx", table)
+    assert isinstance(found_by_onnx, ft.Predictions)
+    assert found_by_onnx.classes == expected
+    table.to_csv(tmp_path / "t.csv", index=False)
+    assert ft.run(rules_from_tree(tree), tmp_path / "t.csv").classes == expected
+    for frame in (duckdb.from_df(table), pl.from_pandas(table).lazy()):
+        rows = ft.predict(frame, tree)
+        found = rows.df() if hasattr(rows, "df") else rows.collect().to_pandas()
+        assert found["class"].tolist() == expected
+
+
+@pytest.mark.parametrize("dialect", ["duckdb", "sqlite"])
+def test_sql_compares_texts(dialect: Literal["duckdb", "sqlite"]) -> None:
+    cells = [("Biscoe", 1.0), ("Dream", 3.0), ("Mars", 1.0), (None, None)]
+    query = sql.write(everyday_tree(), dialect=dialect, table="t").content.decode()
+    is_duckdb = dialect == "duckdb"
+    rows: Any = duckdb.connect() if is_duckdb else sqlite3.connect(":memory:")
+    rows.execute("CREATE TABLE t (island VARCHAR, bill DOUBLE)")
+    rows.executemany("INSERT INTO t VALUES (?, ?)", cells)
+    found = [row[2] for row in rows.execute(query).fetchall()]
+    assert found == ["Adelie", "Gentoo", "Adelie", "Adelie"]
+
+
+def test_every_representation_agrees_on_missing_and_unknown_cells() -> None:
+    rows = pd.DataFrame({"island": ["Biscoe", "Mars", None], "bill": [None, 3.0, 9.0]})
+    report = ft.check(everyday_tree(), data=rows)
+    assert report.ok
+    examined = {one.representation for one in report.comparisons}
+    assert {"c", "native", "onnxruntime"} <= {one.split()[0] for one in examined}

@@ -12,8 +12,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, cast
 
 from fuzzytree.checking import export
+from fuzzytree.columns import BOOLEANS
 from fuzzytree.errors import TableError
-from fuzzytree.model import FuzzyTree
+from fuzzytree.model import DATE_UNIT, FuzzyTree, Variable
 from fuzzytree.semantics import Status
 
 if TYPE_CHECKING:
@@ -73,19 +74,14 @@ def prediction_query(
         LossError: If the model has more rules or levels than a query can have.
     """
     columns: list[str] = []
+    variables = {one.name.strip(): one for one in predictor.model.variables}
     for place, (name, is_long) in enumerate(numbers.items(), 1):
         cell, title = _quoted(name), name.strip() or f"column {place}"
         columns.append(f'{cell} AS "kept {place}"')
         if title not in predictor.inputs:
             continue
-        if is_long is None:
-            raise TableError(
-                f"the table: column {title!r} is no column of numbers, which the model "
-                "needs: cast it to DOUBLE before"
-            )
-        # an engine may not round to the nearest double, unless it reads a text
-        text = f"CAST({cell} AS VARCHAR)" if is_long else cell
-        columns.append(f"CAST({text} AS DOUBLE) AS {_quoted(title)}")
+        value = _input(cell, title, is_long, variables[title])
+        columns.append(f"{value} AS {_quoted(title)}")
     model = predictor.model
     rules = () if isinstance(model, FuzzyTree) else range(1, len(model.rules) + 1)
     sql = export(
@@ -109,6 +105,31 @@ def prediction_query(
         f'CASE WHEN "rule" > 0 THEN {f"GREATEST({strengths})" if strengths else "1e0"} '
         'END AS "strength" FROM predictions'
     )
+
+
+def _input(cell: str, title: str, is_long: bool | None, variable: Variable) -> str:
+    """Return a column as the query of the model takes it.
+
+    Raises:
+        TableError: If it holds something else.
+    """
+    if variable.categories == BOOLEANS:
+        return f"TRY_CAST({cell} AS BOOLEAN)"
+    text = f"CAST({cell} AS VARCHAR)"
+    if variable.categories and is_long is False:  # 2.0 is the category 2
+        whole = f"CAST(CAST({cell} AS BIGINT) AS VARCHAR)"
+        return f"CASE WHEN {cell} = FLOOR({cell}) THEN {whole} ELSE {text} END"
+    if variable.categories:
+        return f"TRIM({text})"
+    if is_long is None and variable.unit == DATE_UNIT:
+        return f"EPOCH_US(CAST({cell} AS TIMESTAMP)) / 86400000000e0"
+    if is_long is None:
+        raise TableError(
+            f"the table: column {title!r} is no column of numbers, which the model "
+            "needs: cast it to DOUBLE before"
+        )
+    # an engine may not round to the nearest double, unless it reads a text
+    return f"CAST({text if is_long else cell} AS DOUBLE)"
 
 
 def _quoted(name: str) -> str:
