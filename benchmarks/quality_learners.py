@@ -302,15 +302,6 @@ def _farc_size(model: Any) -> Size:
     return _size(np.flatnonzero(rule.antecedent[:, 0] >= 0) for rule in rules)
 
 
-def _fuzzytree(**settings: Any) -> Make:
-    def make(_table: Table, _leaves: int) -> Any:
-        from fuzzytree.estimator import FuzzyTreeClassifier
-
-        return FuzzyTreeClassifier(**settings)
-
-    return make
-
-
 def _fuzzytree_size(model: Any) -> Size:
     from fuzzytree.semantics import rules_from_tree
 
@@ -325,24 +316,27 @@ def _fuzzytree_size(model: Any) -> Size:
     )
 
 
+OURS = "fuzzytree"
+
+
 def _ours(*, is_small: bool = False, **settings: Any) -> Learner:
     return Learner(
-        _fuzzytree(**settings),
+        _peer("fuzzytree.estimator.FuzzyTreeClassifier", lambda _table: {}, **settings),
         _fuzzytree_size,
         is_small,
-        takes_frame=TEXT_COLUMNS,
+        takes_frame=True,
         package="fuzzytree-toolkit",
     )
 
 
-OURS = "fuzzytree"
-TEXT_COLUMNS = False
-"""Whether FuzzyTreeClassifier is given categories by name, or their codes."""
-
 LEARNERS: dict[str, Learner] = {
     "fuzzytree": _ours(),
     "fuzzytree, one column": _ours(columns=1),
-    "fuzzytree, paper": _ours(mode="paper"),
+    "fuzzytree, paper": Learner(
+        _peer("fuzzytree.estimator.FuzzyTreeClassifier", mode="paper"),
+        _in_pipeline(_fuzzytree_size),
+        package="fuzzytree-toolkit",
+    ),
     "fuzzytree, 10 leaves": _ours(leaves=MOST, is_small=True),
     "fuzzytree, one column, 10 leaves": _ours(columns=1, leaves=MOST, is_small=True),
     "DecisionTree": Learner(_tree(), _tree_size),
