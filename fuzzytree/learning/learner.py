@@ -200,7 +200,9 @@ class ArrayLearner:
             progress("fitting sets", 1.0)
         places = {name: place for place, name in enumerate(self.columns)}
         counts = moments.counts if drops else self.statistics.counts()
-        tree = with_probabilities(made.tree, sample, counts, places)
+        tree = with_probabilities(
+            made.tree, sample, counts, places, accuracy=choice.accuracy
+        )
         if self.settings.mode != "paper":
             tree = described(tree, self.columns, table, self.statistics)
         return Learnt(tree, self._report(moments, sample, choice, made))

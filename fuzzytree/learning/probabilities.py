@@ -2,9 +2,13 @@
 
 A row's probabilities are a mixture of the leaves' (`fuzzytree.model.probabilities`).
 For a given sharpness the vectors are those under which the rows' own classes are most
-likely, found by expectation maximisation from the frequencies of the leaves, with two
+likely, found by expectation maximisation from the frequencies of the leaves, with some
 further rows at each leaf that belong to all classes evenly. The sharpness is the one
 with the smallest log-loss where each row is left out of the vectors that rate it.
+
+The tree was grown on these rows, so it is right about more of them than about others.
+Of 1, 2, 4, ... further rows there are as many as bring the mean probability of the
+predicted class nearest to the share of held-out rows about which trees were right.
 """
 
 from __future__ import annotations
@@ -31,14 +35,20 @@ from fuzzytree.model import (
 )
 
 _TRIED = (1, 2, 4, 8, 16, 32, 128, 1024)
-_EVEN_ROWS = 2.0
+_EVEN_ROWS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
+_FEW_EVEN_ROWS = 2.0  # without held-out rows
 _STEPS = 10
-_MOST_TO_CHOOSE = 1 << 19  # leaves times rows, to choose the sharpness by
+_MOST_TO_CHOOSE = 1 << 18  # leaves times rows, to choose the sharpness by
 _MOST_TO_FIT = 1 << 22
 
 
 def with_probabilities(
-    tree: FuzzyTree, sample: Sample, counts: IntArray, columns: dict[str, int]
+    tree: FuzzyTree,
+    sample: Sample,
+    counts: IntArray,
+    columns: dict[str, int],
+    *,
+    accuracy: float | None = None,
 ) -> FuzzyTree:
     """Return a tree whose leaves have probabilities.
 
@@ -49,18 +59,18 @@ def with_probabilities(
         sample: Rows of the table, ordered by class.
         counts: How many rows of the table each class has.
         columns: The position of each column in the rows.
+        accuracy: The share of held-out rows about which trees were right, if known.
     """
     leaves, classes = len(tree.leaves), len(tree.classes)
     if leaves > MOST_MIXED or leaves * classes > MOST_PROBABILITIES:
         return tree
     few = _thinned(sample, _MOST_TO_CHOOSE // leaves)
     rows = _rated(tree, sample, few, counts, columns)
-    losses = [_fitted(rows, sharpness)[1] for sharpness in _TRIED]
-    sharpness = _TRIED[int(np.argmin(losses))]
+    sharpness, even = _chosen(rows, accuracy)
     many = _thinned(sample, _MOST_TO_FIT // leaves)
     if len(many) > len(few):
         rows = _rated(tree, sample, many, counts, columns)
-    vectors = _in_parts(_fitted(rows, sharpness)[0])
+    vectors = _in_parts(_fitted(rows, sharpness, even).vectors)
     semantics = msgspec.structs.replace(tree.semantics, sharpness=sharpness)
     ends = tuple(
         msgspec.structs.replace(leaf, probabilities=tuple(vector))
@@ -77,12 +87,42 @@ class _Rows(msgspec.Struct, frozen=True):
         codes: The class of each row, in ascending order.
         weights: How many rows of the table each row stands for.
         classes: How many there are.
+        predicted: The predicted class of each row.
     """
 
     strengths: FloatArray
     codes: IntArray
     weights: FloatArray
     classes: int
+    predicted: IntArray
+
+
+class _Fit(msgspec.Struct, frozen=True):
+    """The probabilities of the leaves, and how they rate the rows.
+
+    Attributes:
+        vectors: Shape (leaves, classes).
+        loss: The log-loss, each row left out of the vectors that rate it.
+        confidence: The mean probability of the predicted class.
+    """
+
+    vectors: FloatArray
+    loss: float
+    confidence: float
+
+
+def _chosen(rows: _Rows, accuracy: float | None) -> tuple[int, float]:
+    """Return the sharpness, and how many further rows each leaf has."""
+    chosen, least = (_TRIED[0], _FEW_EVEN_ROWS), np.inf
+    for even in (_FEW_EVEN_ROWS,) if accuracy is None else _EVEN_ROWS:
+        fits = [_fitted(rows, sharpness, even) for sharpness in _TRIED]
+        best = min(range(len(fits)), key=lambda place: fits[place].loss)
+        apart = fits[best].confidence - (accuracy or 0.0)
+        if abs(apart) < least:
+            chosen, least = (_TRIED[best], even), abs(apart)
+        if apart <= 0.0:
+            break
+    return chosen
 
 
 def _thinned(sample: Sample, most: int) -> IntArray:
@@ -109,7 +149,10 @@ def _rated(
     kept = np.bincount(codes, minlength=len(counts))
     weights = counts[codes] / kept[codes]
     strengths = leaf_strengths(tree, sample.rows[places].T, columns)
-    return _Rows(strengths, codes, weights, len(tree.classes))
+    places_of = {name: code for code, name in enumerate(tree.classes)}
+    owners = np.array([places_of[leaf.label] for leaf in tree.leaves], np.int64)
+    predicted = owners[strengths.argmax(axis=0)]
+    return _Rows(strengths, codes, weights, len(tree.classes), predicted)
 
 
 def leaf_strengths(
@@ -175,34 +218,35 @@ def _degrees(band: Band, axis: FloatArray) -> FloatArray:
     return degrees
 
 
-def _fitted(rows: _Rows, sharpness: int) -> tuple[FloatArray, float]:
-    """Return the vectors of the leaves, and the log-loss of rows left out.
-
-    The vectors have shape (leaves, classes).
-    """
+def _fitted(rows: _Rows, sharpness: int, even: float) -> _Fit:
+    """Return the likeliest vectors of the leaves, given the further rows of each."""
     powers = rows.strengths
     for _ in range(squarings(sharpness)):
         powers = powers * powers
     powers = np.floor(WEIGHT_OF_ONE * powers)
     shares = np.where(rows.strengths == 1.0, rows.weights, 0.0)
     for _ in range(_STEPS):
-        shares = powers * _vectors(shares, rows)[0][:, rows.codes]
+        shares = powers * _vectors(shares, rows, even)[0][:, rows.codes]
         shares *= rows.weights / shares.sum(axis=0)
-    vectors, totals = _vectors(shares, rows)
+    vectors, totals = _vectors(shares, rows, even)
     likely = vectors[:, rows.codes] * totals
     left_out = (likely - shares) / (totals - shares)
     chances = (powers * left_out).sum(axis=0) / powers.sum(axis=0)
     loss = -(rows.weights * np.log(chances)).sum() / rows.weights.sum()
-    return vectors, float(loss)
+    whole = rows.weights / powers.sum(axis=0) / rows.weights.sum()
+    rated = (powers * vectors[:, rows.predicted]).sum(axis=0)
+    return _Fit(vectors, float(loss), float((rated * whole).sum()))
 
 
-def _vectors(shares: FloatArray, rows: _Rows) -> tuple[FloatArray, FloatArray]:
+def _vectors(
+    shares: FloatArray, rows: _Rows, even: float
+) -> tuple[FloatArray, FloatArray]:
     """Return the vectors of the leaves, and how many rows each leaf has.
 
     The share of a row in a leaf counts for the row's class.
     """
     present, starts = np.unique(rows.codes, return_index=True)
-    counts = np.full((len(shares), rows.classes), _EVEN_ROWS / rows.classes)
+    counts = np.full((len(shares), rows.classes), even / rows.classes)
     counts[:, present] += np.add.reduceat(shares, starts, axis=1)
     totals = counts.sum(axis=1, keepdims=True)
     return counts / totals, totals

@@ -9,8 +9,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from fuzzytree import tables
+from fuzzytree import api, tables
 from fuzzytree.exporters.table import TABLE
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.testing import rated
 from tests.cli.conftest import GRASPS, Call
 
 ANSWERS = (
@@ -232,3 +234,29 @@ def test_blanks_around_names_are_left_out_with_a_remark(call: Call) -> None:
     text = "blanks around its name, which are left out (and 1 more)"
     assert code == 0
     assert f"remark    ' force' has {text}" in said.splitlines()
+
+
+def test_probabilities_are_reported_for_each_class(call: Call) -> None:
+    tree = api.load("grip.yaml")
+    assert isinstance(tree, FuzzyTree)
+    api.save(rated(tree, 3), "rated.yaml")
+    out = call("run", "rated.yaml", "grasps.csv", "--probabilities")[1]
+    head, first, *_, last = out.splitlines()
+    assert head == (
+        "class,rule,status,probability of class firm,probability of class loose,"
+        "probability of class soft"
+    )
+    shares = [*map(float, first.split(",")[3:])]
+    assert abs(sum(shares) - 1.0) <= 1e-15
+    assert first.startswith("soft,1,decided,")
+    assert max(shares) == shares[2]
+    assert last == ",0,missing,,,"
+
+
+def test_a_model_without_probabilities_cannot_report_them(call: Call) -> None:
+    code, _, err = call("run", "grip.yaml", "grasps.csv", "--probabilities")
+    assert code == 2
+    assert err == (
+        "grip has no probabilities of classes\n"
+        "  fuzzytree run --help lists the options\n"
+    )
