@@ -901,7 +901,8 @@ def _mixed_text(
         (table, example),
     )
     among = " and ".join(f"{n:,} {one}{'s' * (n > 1)}" for n, one in others)
-    text = "text where a number is needed" if kind == "text" else f"a {kind}"
+    needed = others[-1][1] if others else "number"
+    text = f"text where a {needed} is needed" if kind == "text" else f"a {kind}"
     share = f" ({count:,} among {among})" if among else _more(count)
     return (
         f"{where}: column {name!r} holds {text}: "

@@ -170,16 +170,22 @@ def remarks(table: Table, ignoring: Callable[[str], str]) -> Iterator[tuple[str,
 def refuse_measurements(
     name: str, target: str, classes: Sequence[str], codes: IntArray
 ) -> None:
-    """Raise a LearningError if a target holds measurements; see `remarks`."""
+    """Raise a LearningError if a target holds measurements or identifiers."""
+    of = f" {target!r}" if target else ""
     numbers = [*map(_number, classes)]
     if not all(map(math.isfinite, numbers)):
+        if len(classes) == len(codes) > _FEW_ROWS:
+            text = f"has another class in each of {len(codes)} rows"
+            raise LearningError(
+                f"{name}: the target{of} {text}, as an identifier has, and nothing can "
+                "be learnt about a class of one row; name the column of the classes"
+            )
         return
     has_fractions = any(not number.is_integer() for number in numbers)
     single = int(np.count_nonzero(np.bincount(codes) == 1))
     is_spread = 2 * single > len(codes)
     is_many = len(numbers) > _MANY
     if has_fractions + is_spread + is_many >= 2:
-        of = f" {target!r}" if target else ""
         raise LearningError(
             f"{name}: the target{of} is continuous, with {len(numbers)} "
             f"different numbers in {len(codes)} rows, and a tree predicts "

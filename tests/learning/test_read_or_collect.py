@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from fuzzytree import tables
 from fuzzytree.errors import LearningError, TableError
 from fuzzytree.learning import Learner, parts
 from fuzzytree.model import fingerprint
-from fuzzytree.tables import Table
+from fuzzytree.tables import Table, read_table
 
 PIECE = 64
 
@@ -168,3 +169,75 @@ def test_progress_has_the_rows_so_far_and_their_speed(tmp_path: Path) -> None:
     ft.learn(path, target="kind", progress=lambda text, _: texts.append(text))
     reading = [text for text in texts if text.endswith("rows/s")]
     assert reading[-1].startswith(f"{path}: {2 * PIECE + 50:,} rows, ")
+
+
+EVERYDAY = (
+    "island,bill,seen,wild,species\n"
+    + "Biscoe,39.5,2024-01-01,true,Adelie\n" * 9
+    + "Dream,NA,2024-01-02,false,Gentoo\n" * 9
+    + ",48,2024-01-03T12:00Z,,Gentoo\n" * 3
+)
+
+
+def test_texts_dates_and_missing_cells_are_learnt_from(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(EVERYDAY, "utf-8")
+    tree = ft.learn(tmp_path / "t.csv", target="species")
+    table = read_table(tmp_path / "t.csv", target="species")
+    assert table.categories == {
+        "island": ("Biscoe", "Dream"),
+        "wild": ("False", "True"),
+    }
+    assert table.dates == ("seen",)
+    assert table.values[2].max() == 19725.5
+    for variable in tree.variables:
+        if not variable.parts:
+            assert variable.missing is not None
+    found = ft.run(tree, tmp_path / "t.csv")
+    assert found.classes == ["Adelie"] * 9 + ["Gentoo"] * 12
+
+
+def test_parts_of_texts_give_the_tree_of_the_whole_table(tmp_path: Path) -> None:
+    head, *lines = EVERYDAY.splitlines()
+    (tmp_path / "t.csv").write_text(EVERYDAY, "utf-8")
+    expected = ft.learn(tmp_path / "t.csv", target="species", name="tree")
+    merged: Learner | None = None
+    for part in (2, 0, 1):
+        path = tmp_path / "p.csv"
+        path.write_text("\n".join([head, *lines[::-1][part::3]]), "utf-8")
+        learner = Learner("species")
+        learner.update(path)
+        loaded = Learner.from_bytes(learner.to_bytes())
+        merged = loaded.merge(merged, repeated=True) if merged else loaded
+    assert merged is not None
+    assert fingerprint(merged.learn()) == fingerprint(expected)
+
+
+def test_columns_that_say_nothing_are_left_out_with_a_remark(tmp_path: Path) -> None:
+    rows = [f"{k},name {k},,{'xy'[k % 2]}" for k in range(60)]
+    text = "\n".join(["size,name,empty,kind", *rows])
+    (tmp_path / "t.csv").write_text(text, "utf-8")
+    table = read_table(tmp_path / "t.csv", target="kind")
+    assert table.columns == ("size",)
+    assert table.remarks == (
+        (
+            "name",
+            "60 different texts in 60 rows, as an identifier has; it is left out; "
+            "--categorical name keeps it",
+        ),
+        ("empty", "no value in any row; it is left out"),
+    )
+    source = ft.table(tmp_path / "t.csv", categorical=["name"])
+    assert len(read_table(source, target="kind").categories["name"]) == 60
+
+
+def test_a_target_that_identifies_the_rows_is_refused(tmp_path: Path) -> None:
+    rows = [f"{k % 7},name {k}" for k in range(60)]
+    (tmp_path / "t.csv").write_text("\n".join(["size,name", *rows]), "utf-8")
+    with pytest.raises(LearningError, match="has another class in each of 60 rows"):
+        ft.learn(tmp_path / "t.csv", target="name")
+
+
+def test_paper_mode_refuses_texts() -> None:
+    settings = ft.LearningSettings(mode="paper")
+    with pytest.raises(LearningError, match="numbers alone, and not from 'island'"):
+        ft.learn(io.StringIO(EVERYDAY), target="species", settings=settings)
