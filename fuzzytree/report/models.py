@@ -37,6 +37,7 @@ from fuzzytree.model import (
     intervals,
     kind_of,
     sentence,
+    stand_ins,
 )
 from fuzzytree.report.text import aligned, counted, number
 from fuzzytree.runtimes import Facts, OnnxModel, Outputs
@@ -169,6 +170,11 @@ def head_lines(model: Document) -> Iterator[str]:
     yield f"classes  {len(model.classes)}: {', '.join(model.classes)}"
     semantics = model.semantics
     answers = f"missing value: {semantics.missing or 'no class'}"
+    filled = len(stand_ins(model.variables))
+    if filled:
+        rest = len(model.inputs) - filled
+        more = f"; {answers.removeprefix('missing value: ')} for {rest}" if rest else ""
+        answers = f"missing value: replaced, see `missing as` of {filled} inputs{more}"
     if isinstance(model, RuleBase):
         answers += f"; no rule fires: {semantics.uncovered or 'no class'}"
         answers += f"; AND is {semantics.conjunction}; the first of the strongest wins"
