@@ -39,7 +39,7 @@ _EVEN_ROWS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
 _FEW_EVEN_ROWS = 2.0  # without held-out rows
 _STEPS = 10
 _MOST_TO_CHOOSE = 1 << 18  # leaves times rows, to choose the sharpness by
-_MOST_TO_FIT = 1 << 22
+_MOST_TO_FIT = 1 << 21
 
 
 def with_probabilities(

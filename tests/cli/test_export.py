@@ -183,7 +183,8 @@ def test_raw_rules_of_a_tree_without_sets_are_refused(call: Call) -> None:
         ),
         (
             ("grip.yaml", "-o", "x.onnx", "--outputs", "label,colour"),
-            "outputs: there is label, rule, strengths, status, probabilities, not 'colour'",
+            "outputs: there is label, rule, strengths, status, probabilities, not "
+            "'colour'",
         ),
         (
             ("grip.yaml", "-o", "x.yaml", "--dtype", "float32"),
