@@ -191,9 +191,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             ValueError: If the table has one row, one class or no varying column, or
                 a setting is out of its range.
         """
-        X, categories, dates = _as_numbers(X)
+        table, categories, dates = _as_numbers(X)
         values, labels = _validated(
-            self, X, y, dtype=np.float64, ensure_all_finite=self._finite()
+            self, table, y, dtype=np.float64, ensure_all_finite=self._finite()
         )
         check_classification_targets(labels)
         if len(values) == 1:
@@ -373,9 +373,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _values(self, X: npt.ArrayLike) -> FloatArray:
         """Return the columns that the tree needs, shape (inputs, rows)."""
         check_is_fitted(self)
-        X, _, _ = _as_numbers(X, self.tree_.variables)
+        table, _, _ = _as_numbers(X, self.tree_.variables)
         values: FloatArray = _validated(
-            self, X, reset=False, dtype=np.float64, ensure_all_finite=self._finite()
+            self, table, reset=False, dtype=np.float64, ensure_all_finite=self._finite()
         )
         position = {name: k for k, name in enumerate(self._columns())}
         return values.T[[position[name] for name in self.tree_.inputs]]

@@ -109,8 +109,9 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     def known(self, values: FloatArray) -> npt.NDArray[np.bool_]:
         """Return which rows, of shape (inputs, rows), have all values."""
         replaced = np.array([[name in self.stand_ins] for name in self.inputs])
-        known: npt.NDArray[np.bool_] = (np.isfinite(values) | replaced).all(axis=0)
-        return known
+        known = np.isfinite(values) | replaced
+        rows: npt.NDArray[np.bool_] = np.logical_and.reduce(known, axis=0)
+        return rows
 
 
 class OnnxModel(Facts, frozen=True, kw_only=True):
