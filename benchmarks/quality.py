@@ -1,4 +1,4 @@
-"""How good the learner is: a study on 43 tables of KEEL and four of scikit-learn.
+r"""How good the learner is: a study on 43 tables of KEEL and four of scikit-learn.
 
     python benchmarks/quality.py --run [LEARNER ...] [--tables TABLE ...]
     python benchmarks/quality.py --page
@@ -6,11 +6,19 @@
 Each learner answers ten stratified folds of each table, one process at a time. What is
 measured is kept in out/quality, a file for each table and learner, so that a run that
 was interrupted goes on; `--page` puts it into docs/explanation/quality.json and makes
-the page and its pictures from that file, from which later runs go on as well. A fold
-that takes more than `--seconds` of CPU time ends the learner on that table.
+the page and its pictures from that file, from which later runs go on as well; with
+`--again`, known results are measured anew. A fold that takes more than `--seconds` of
+CPU time ends the learner on that table.
 
 Settings are chosen on tables whose names begin with a to m. The other half is for the
-end: `--run` leaves fuzzytree out on it unless `--all-tables` is given.
+end: `--run` leaves fuzzytree out on it unless `--all-tables` is given. What is said of
+a version of fuzzytree in the end is one command and the page:
+
+    python benchmarks/quality.py --again --all-tables --page --run "fuzzytree" \
+        "fuzzytree, one column" "fuzzytree, 10 leaves" "fuzzytree, paper" \
+        "fuzzytree, one column, 10 leaves" "DecisionTree of as many leaves" \
+        "DecisionTree of as many leaves as one column" \
+        "FIGS of as many leaves as one column"
 
 The learners of others are not requirements of this project, and not all of them go
 into one environment. Run each environment for what is installed in it; `--run` without
@@ -65,11 +73,15 @@ def main() -> int:
     parser.add_argument("--page", action="store_true", help="collect and write")
     options = parser.parse_args()
     if options.run is not None:
-        kept = json.loads(RESULTS.read_bytes())["tables"] if RESULTS.exists() else {}
+        is_new = options.again or not RESULTS.exists()
+        kept = {} if is_new else json.loads(RESULTS.read_bytes())["tables"]
         for table in map(tables.load, options.tables or tables.names()):
             known = kept.get(table.name, {}).get("learners", {})
             for name in options.run or [name for name in LEARNERS if _is_there(name)]:
                 if table.is_open or options.all_tables or OURS not in name:
+                    if options.again:
+                        path = result_path(options.folder, name, table.name)
+                        path.unlink(missing_ok=True)
                     run(name, table, options.folder, options.seconds, known)
     if options.page:
         from quality_page import collected, write
@@ -84,6 +96,11 @@ def _is_there(name: str) -> bool:
     except importlib.metadata.PackageNotFoundError:
         return OURS in name
     return True
+
+
+def result_path(folder: Path, learner: str, table: str) -> Path:
+    """Return where the result of a learner on a table is kept."""
+    return folder / table / f"{learner}.json"
 
 
 def _version(package: str) -> str:
@@ -102,7 +119,7 @@ def run(
     known: dict[str, Result],
 ) -> None:
     """Measure a learner on a table, unless that was done before."""
-    path = folder / table.name / f"{name}.json"
+    path = result_path(folder, name, table.name)
     if path.exists() or name in known:
         return
     learner = LEARNERS[name]
