@@ -49,7 +49,7 @@ among KEEL's and one is a part of another there. Everybody answers the same ten 
   rows of a leaf and FIGS has fewer splits; others take 10 as a setting. HTSK has 3
   rules that use all columns.
 - Text columns are one-hot where a learner takes numbers only, and categories elsewhere.
-  *Of as many leaves* is held, fold by fold, to the leaves of fuzzytree, or of fuzzytree
+  *Of as many leaves* has, fold by fold, at most the leaves of fuzzytree, or of fuzzytree
   with one column a node.
 - Settings of ours were chosen on tables whose names begin with a to m; those from n to
   z are looked at once, at the end. The two halves are reported apart. Earlier versions
@@ -210,7 +210,7 @@ def _group(
     yield (
         f"Friedman's test over {len(measured)} tables: p = {friedman(ranked):.1g}; the"
         f" critical difference is {difference:.2f}. Learners beside one line are not"
-        " told apart."
+        " distinguished."
     )
     if left := sorted({*names} - {*measured}):
         yield f"Not ranked on {', '.join(left)}, where not all were measured yet."
