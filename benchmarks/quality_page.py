@@ -49,8 +49,8 @@ among KEEL's and one is a part of another there. Everybody answers the same ten 
   rows of a leaf and FIGS has fewer splits; others take 10 as a setting. HTSK has 3
   rules that use all columns.
 - Text columns are one-hot where a learner takes numbers only, and categories elsewhere.
-  *Of as many leaves* has, fold by fold, at most the leaves of fuzzytree, or of fuzzytree
-  with one column a node.
+  *Of as many leaves* has, fold by fold, at most the leaves of fuzzytree, or of
+  fuzzytree with one column a node.
 - Settings of ours were chosen on tables whose names begin with a to m; those from n to
   z are looked at once, at the end. The two halves are reported apart. Earlier versions
   were measured on `breast_cancer` of scikit-learn, which is `wdbc` of the second half.
