@@ -67,9 +67,6 @@ class ExperimentOptions(ResultOptions):
         "`paper` is the paper's learner to the letter.",
         choices=["default", "paper"],
     )
-    patterns: int | None = option(
-        "--patterns", "For each class.", type=click.IntRange(1)
-    )
     shrinkage: float | None = option(
         "--shrinkage", "Of off-diagonal scatter, 0 to 1.", type=float
     )
@@ -78,7 +75,7 @@ class ExperimentOptions(ResultOptions):
     )
     choose: bool = option(
         "--choose",
-        "Choose patterns, shrinkage and entry without those who are tested.",
+        "Choose shrinkage and entry without those who are tested.",
         is_flag=True,
     )
     sensor: str = option(
@@ -128,7 +125,6 @@ def command(options: ExperimentOptions) -> None:
         _check_folder(Path(options.output))
     given = {
         "mode": options.mode,
-        "patterns_per_class": options.patterns,
         "shrinkage": options.shrinkage,
         "entry": options.entry,
     }

@@ -29,38 +29,29 @@ class Candidate(Value, frozen=True):
     """LearningSettings that may be chosen.
 
     Attributes:
-        patterns: For each class.
         shrinkage: Of the off-diagonal of a scatter.
         entry: What a further feature must gain.
     """
 
-    patterns: int
     shrinkage: float
     entry: float
 
     @property
     def text(self) -> str:
         """The settings, in words."""
-        many = "pattern" if self.patterns == 1 else "patterns"
-        return (
-            f"{self.patterns} {many}, shrinkage {self.shrinkage:g}, "
-            f"entry {self.entry:g}"
-        )
+        return f"shrinkage {self.shrinkage:g}, entry {self.entry:g}"
 
     def applied(self, settings: LearningSettings) -> LearningSettings:
         """Return settings with these in them."""
         return msgspec.structs.replace(
             settings,
-            patterns_per_class=self.patterns,
             shrinkage=self.shrinkage,
             entry=self.entry,
         )
 
 
 CANDIDATES: tuple[Candidate, ...] = tuple(
-    itertools.starmap(
-        Candidate, itertools.product((1, 2, 3), (0.01, 0.1, 0.5, 0.9), (2.0, 0.0))
-    )
+    itertools.starmap(Candidate, itertools.product((0.01, 0.1, 0.5, 0.9), (2.0, 0.0)))
 )
 """What may be chosen, the smallest tree first."""
 

@@ -94,7 +94,7 @@ def paper_task(
         np.zeros(0, np.int64),
         splits,
         "paper",
-        LearningSettings(patterns_per_class=1),
+        LearningSettings(),
         conditions=_text(physics),
         is_whole=False,
     )

@@ -384,15 +384,10 @@ def settings_text(settings: LearningSettings) -> str:
     """Return the settings that matter, in words.
 
     Example:
-        >>> settings_text(LearningSettings(patterns_per_class=2))
-        'default mode, 2 patterns a class, L_MAX 10, shrinkage 0.001, entry 2'
+        >>> settings_text(LearningSettings())
+        'default mode, shrinkage 0.001, entry 2'
     """
-    patterns = settings.patterns_per_class
-    if patterns is None:
-        patterns = 1 if settings.mode == "paper" else "auto"
-    many = "pattern" if patterns == 1 else "patterns"
-    text = f"{settings.mode} mode, {patterns} {many} a class, "
-    text += f"L_MAX {settings.effective_l_max:g}"
+    text = f"{settings.mode} mode"
     if settings.mode == "paper":
         return text
     return f"{text}, shrinkage {settings.shrinkage:g}, entry {settings.entry:g}"

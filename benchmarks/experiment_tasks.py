@@ -109,7 +109,7 @@ KNOWN: Mapping[str, Known] = MappingProxyType(
             full=1000,
             threshold=0,
             features="blocks:16x8 / force",
-            settings=LearningSettings(patterns_per_class=3, shrinkage=0.9, entry=0.0),
+            settings=LearningSettings(shrinkage=0.9, entry=0.0),
         ),
         "postures-17": Known(
             "13 people on a mat of 64 x 32 cells: 17 postures",
@@ -118,7 +118,7 @@ KNOWN: Mapping[str, Known] = MappingProxyType(
             full=1000,
             threshold=10,
             features=f"{SHAPES}, blocks:16x8 / force",
-            settings=LearningSettings(patterns_per_class=1, shrinkage=0.5, entry=0.0),
+            settings=LearningSettings(shrinkage=0.5, entry=0.0),
         ),
         "touch": Known(
             "17 people on a touch screen of 27 x 15 cells: the thumb or another finger",
@@ -127,7 +127,7 @@ KNOWN: Mapping[str, Known] = MappingProxyType(
             full=255,
             threshold=40,
             features=SHAPES,
-            settings=LearningSettings(patterns_per_class=1, shrinkage=0.9),
+            settings=LearningSettings(shrinkage=0.9),
             others="other finger",
         ),
         "touch-fingers": Known(
@@ -137,7 +137,7 @@ KNOWN: Mapping[str, Known] = MappingProxyType(
             full=255,
             threshold=40,
             features=SHAPES,
-            settings=LearningSettings(patterns_per_class=2, shrinkage=0.1),
+            settings=LearningSettings(shrinkage=0.1),
         ),
     }
 )

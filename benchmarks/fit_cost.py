@@ -49,9 +49,7 @@ def ratios(values: FloatArray, labels: IntArray) -> list[str]:
     ways: dict[str, Callable[[], object]] = {
         "GaussianNB": lambda: GaussianNB().fit(values, labels),
         "default": lambda: learn(values, labels, LearningSettings()),
-        "one pattern a class": lambda: learn(
-            values, labels, LearningSettings(patterns_per_class=1)
-        ),
+        "single columns": lambda: learn(values, labels, LearningSettings(columns=1)),
         "paper": lambda: learn(values, labels, LearningSettings(mode="paper")),
         "partial_fit, 100 chunks": lambda: learn_in_chunks(values, labels, 100),
     }

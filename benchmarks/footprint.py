@@ -158,7 +158,10 @@ def child(code: str, folder: str) -> list[str]:
 def wine() -> FuzzyTree:
     """Return the tree of the README."""
     return ft.learn(
-        WINE, target="cultivar", name="wine", settings=ft.LearningSettings(entry=25.0)
+        WINE,
+        target="cultivar",
+        name="wine",
+        settings=ft.LearningSettings(columns=1, leaves=4),
     )
 
 

@@ -182,7 +182,10 @@ def drawn() -> str:
     """Learn on the wine table and return its picture."""
     table = HERE / "wine" / "wine.csv"
     tree = ft.learn(
-        table, target="cultivar", name="wine", settings=ft.LearningSettings(entry=25)
+        table,
+        target="cultivar",
+        name="wine",
+        settings=ft.LearningSettings(columns=1, leaves=4),
     )
     return picture(tree, ft.rules_from_tree(tree))
 

@@ -38,8 +38,7 @@ if TYPE_CHECKING:
 
 LabelArray = npt.NDArray[np.generic]
 Mode = Literal["default", "paper"]
-PatternsPerClass = int | Literal["auto"] | Mapping[str, int] | None
-Choice = Literal["alpha", "l_max", "shrinkage", "entry"]
+PatternsPerClass = int | Mapping[str, int] | None
 
 
 def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
@@ -111,17 +110,22 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     Args:
         mode: `default`, or `paper` for the paper's algorithm to the letter.
-        alpha: Weight of the difference of means in the distance of two patterns.
+        columns: How many columns a node looks at, at most; 1 gives rules in the table's
+            own words, None as many as help.
+        leaves: How many leaves the tree has, at most.
+        min_rows: How many rows a leaf holds, at least.
+        depth: How many conditions lead to a leaf, at most.
+        alpha: Weight of the difference of means in the distance of two patterns, of the
+            mode `paper`, as the next two.
         l_max: How wide a margin must be before one column is trusted.
+        patterns_per_class: How many shapes a class has: a number, or a number for each
+            class by its name in the tree.
         points: n of the paper's 2n + 1 points on a fuzzy set, 1 to 8.
         separate_sides: Whether a set's two sides are fitted apart.
-        patterns_per_class: How many shapes a class has: a number, a number for each
-            class by its name in the tree, or `auto` for inner validation.
         shrinkage: How far the off-diagonal of a scatter is shrunk, in [0, 1).
         entry: How much one more column must help a combination.
         costs: The cost of a column, by its name in the tree; 1 unless given.
-        choices: What inner validation may choose beside `patterns_per_class`.
-        seed: Moves the folds of inner validation. The same seed and table give the
+        seed: Moves the folds of held-out rows. The same seed and table give the
             same tree. `fuzzytree.learning.LearningSettings` says more about each.
 
     Attributes:
@@ -141,7 +145,6 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     mode: Mode
     patterns_per_class: PatternsPerClass
-    choices: Sequence[Choice]
     tree_: FuzzyTree
     report_: LearningReport
     classes_: LabelArray
@@ -154,18 +157,25 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         self,
         *,
         mode: Mode = "default",
-        alpha: float = 0.9,
+        columns: int | None = None,
+        leaves: int | None = None,
+        min_rows: int | None = None,
+        depth: int | None = None,
+        alpha: float | None = None,
         l_max: float | None = None,
+        patterns_per_class: PatternsPerClass = None,
         points: int = 3,
         separate_sides: bool = False,
-        patterns_per_class: PatternsPerClass = None,
         shrinkage: float = 1e-3,
         entry: float = 2.0,
         costs: Mapping[str, float] | None = None,
-        choices: Sequence[Choice] = (),
         seed: int = 0,
     ) -> None:
         self.mode = mode
+        self.columns = columns
+        self.leaves = leaves
+        self.min_rows = min_rows
+        self.depth = depth
         self.alpha = alpha
         self.l_max = l_max
         self.points = points
@@ -174,7 +184,6 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         self.shrinkage = shrinkage
         self.entry = entry
         self.costs = costs
-        self.choices = choices
         self.seed = seed
 
     def fit(self, X: npt.ArrayLike, y: npt.ArrayLike) -> Self:
@@ -352,6 +361,10 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _settings(self) -> LearningSettings:
         return LearningSettings(
             mode=self.mode,
+            columns=self.columns,
+            leaves=self.leaves,
+            min_rows=self.min_rows,
+            depth=self.depth,
             alpha=self.alpha,
             l_max=self.l_max,
             points=self.points,
@@ -360,7 +373,6 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             shrinkage=self.shrinkage,
             entry=self.entry,
             costs=self.costs or {},
-            choices=tuple(self.choices),
             seed=self.seed,
         )
 

@@ -4,6 +4,7 @@ from .answering import run as run
 from .holdout import Accuracy as Accuracy
 from .holdout import Summary as Summary
 from .holdout import accuracy as accuracy
+from .holdout import front as front
 from .holdout import majority as majority
 from .leaf_counts import LeafCounts as LeafCounts
 from .verbs import audit as audit

@@ -1,9 +1,8 @@
 """How well trees answer rows that they were not learnt from.
 
-Stratified folds, made from a seed. In small tables each fold chooses its settings
-anew. Large tables are sampled, class by class, and their folds take the settings that
-learning from all rows chose; with thousands of classes fewer folds are tried. So the
-test takes a bounded time, and gives the same shares each time.
+Stratified folds, made from a seed; each chooses anew how to split and to prune. Large
+tables are sampled, class by class, and with thousands of classes fewer folds are tried.
+So the test takes a bounded time, and gives the same shares each time.
 """
 
 from __future__ import annotations
@@ -14,7 +13,13 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.learning import LearningReport, LearningSettings, learn_arrays
+from fuzzytree.learning import (
+    ArrayLearner,
+    Front,
+    LearningReport,
+    LearningSettings,
+    learn_arrays,
+)
 from fuzzytree.model import FloatArray, FuzzyTree, IntArray
 from fuzzytree.runtimes import baseline
 from fuzzytree.tables import Table
@@ -27,9 +32,6 @@ FOLDS = 5
 ROWS = 20_000
 CELLS = 1 << 20
 """The most rows and numbers that the folds are made of; larger tables are sampled."""
-
-CHOOSING_CELLS = 1 << 15
-"""The most numbers of a table in which each fold chooses its own settings."""
 
 _CLASSES = 5000
 """The most classes times folds that are learnt; at least one fold is tried."""
@@ -48,14 +50,11 @@ class Accuracy(msgspec.Struct, frozen=True):
             as wrong.
         rows: How many rows the folds are made of.
         of: How many rows the table has.
-        is_nested: Whether each fold chose its own settings; if not, all folds took
-            those that learning from the whole table chose.
     """
 
     folds: tuple[float, ...]
     rows: int
     of: int
-    is_nested: bool
 
     @property
     def mean(self) -> float:
@@ -82,9 +81,9 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
         majority: The accuracy of predicting the most common class for every row.
         folds: The accuracy of each fold; null without a test.
         rows_tested: How many rows the folds are made of; null without a test.
-        is_nested: Whether each fold chose its own settings; null without a test.
         seed: Of the folds.
         report: What learning counted and repaired.
+        front: How accurate small trees are; null without a test.
     """
 
     file: str
@@ -101,9 +100,9 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     majority: float
     folds: tuple[float, ...] | None
     rows_tested: int | None
-    is_nested: bool | None
     seed: int
     report: LearningReport
+    front: Front | None = None
 
 
 def majority(table: Table) -> float:
@@ -114,7 +113,6 @@ def majority(table: Table) -> float:
 def accuracy(
     table: Table,
     settings: LearningSettings,
-    report: LearningReport,
     *,
     folds: int = FOLDS,
     seed: int = 0,
@@ -125,7 +123,6 @@ def accuracy(
     Args:
         table: The table.
         settings: How to learn.
-        report: Of learning from the whole table.
         folds: How many folds.
         seed: Of the shuffle.
         progress: Called with what is done and which share of it.
@@ -135,7 +132,6 @@ def accuracy(
         leaves one class to learn from.
     """
     width = max(len(table.columns), 1)
-    is_nested = len(table.codes) * width <= CHOOSING_CELLS or not report.chosen
     rows = sampled(table.codes, min(ROWS, CELLS // width), seed)
     if len(rows) < _FEWEST:
         return None
@@ -157,30 +153,45 @@ def accuracy(
             known.astype(np.int64),
             columns=table.columns,
             classes=classes,
-            settings=_of_fold(settings, None if is_nested else report, classes),
+            settings=_of_fold(settings, classes),
             categories=table.categories,
         )
         predicted = _answered(learnt.tree, table, test)
         right = predicted == table.codes[test]
         weight = None if table.weights is None else table.weights[test]
         shares.append(float(np.average(right, weights=weight)))
-    return Accuracy(tuple(shares), len(rows), table.rows, is_nested)
+    return Accuracy(tuple(shares), len(rows), table.rows)
 
 
-def _of_fold(
-    settings: LearningSettings, report: LearningReport | None, classes: Sequence[str]
-) -> LearningSettings:
-    """Return settings for the classes of a fold, as a report says they were chosen."""
-    chosen = dict(report.chosen) if report else {}
+def front(table: Table, settings: LearningSettings) -> Front | None:
+    """Return how accurate small trees are, by columns a node and by leaves.
+
+    Args:
+        table: The table.
+        settings: How to learn; limits that it has hold here too.
+
+    Returns:
+        The accuracies on rows that were held out; None in paper mode, of a sample, or
+        where the rows are too few to hold some out.
+    """
+    if settings.mode == "paper" or table.weights is not None:
+        return None
+    learner = ArrayLearner(
+        columns=table.columns,
+        classes=table.classes,
+        settings=settings,
+        categories=table.categories,
+    )
+    learner.partial_fit(table.values.T, table.codes)
+    return learner.front()
+
+
+def _of_fold(settings: LearningSettings, classes: Sequence[str]) -> LearningSettings:
+    """Return the settings for the classes of a fold."""
     patterns = settings.patterns_per_class
-    if report and chosen.pop("patterns_per_class", None):
-        patterns = report.patterns
     if isinstance(patterns, Mapping):
         patterns = {name: patterns.get(name, 1) for name in classes}
-    choices = () if report else settings.choices
-    return msgspec.structs.replace(
-        settings, patterns_per_class=patterns, choices=choices, **chosen
-    )
+    return msgspec.structs.replace(settings, patterns_per_class=patterns)
 
 
 def folds_of(codes: IntArray, folds: int, seed: int) -> IntArray:

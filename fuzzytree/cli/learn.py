@@ -41,7 +41,13 @@ from fuzzytree.model import Document, Format, printable
 
 if TYPE_CHECKING:
     from fuzzytree.api import Accuracy, LeafCounts, Summary
-    from fuzzytree.learning import Learner, LearningReport, LearningSettings, Learnt
+    from fuzzytree.learning import (
+        Front,
+        Learner,
+        LearningReport,
+        LearningSettings,
+        Learnt,
+    )
     from fuzzytree.model import FuzzyTree
     from fuzzytree.tables import Table
 
@@ -70,6 +76,10 @@ class LearnOptions(RepresentationOptions):
     no_test: bool = flag(
         "--no-test", "Learn without measuring the cross-validated accuracy."
     )
+    front: str | None = option(
+        "--front FILE.svg",
+        "Draw the accuracy of small trees, by columns a node and by leaves.",
+    )
     model: str | None = option(
         "--for MODEL",
         "Write this tree with the supports that states of `collect --for` count.",
@@ -84,15 +94,36 @@ class LearnOptions(RepresentationOptions):
         choices=["default", "paper"],
         default="default",
     )
+    columns: Any = option(
+        "--columns",
+        "Largest number of columns that a node looks at; 1 for rules in their words.",
+        type=int,
+    )
+    leaves: Any = option("--leaves", "Largest number of leaves.", type=int)
+    min_rows: Any = option("--min-rows", "Fewest rows of a leaf.", type=int)
+    depth: Any = option(
+        "--depth", "Largest number of conditions that lead to a leaf.", type=int
+    )
+    entry: Any = option("--entry", "Gain that a further input must bring.", type=float)
+    shrinkage: Any = option(
+        "--shrinkage", "Shrinkage of the off-diagonal scatter, 0 to 1.", type=float
+    )
     alpha: Any = option(
         "--alpha",
-        "Weight of the means in the distance of patterns, 0 to 1.",
+        "Of the paper: weight of the means in the distance of patterns, 0 to 1.",
         type=float,
     )
     l_max: Any = option(
         "--l-max",
-        "Parameter L_MAX of the paper: largest ratio of distances.",
+        "Of the paper: its parameter L_MAX, largest ratio of distances.",
         type=float,
+    )
+    patterns_per_class: Any = option(
+        "--patterns", "Of the paper: number of patterns of each class.", type=int
+    )
+    keep_reversals: Any = flag(
+        "--keep-reversals",
+        "Of the paper: let a wide set take back the far tails of others.",
     )
     points: Any = option(
         "--points", "Number n of the 2n + 1 points on a fitted set, 1 to 8.", type=int
@@ -100,22 +131,8 @@ class LearnOptions(RepresentationOptions):
     separate_sides: Any = flag(
         "--separate-sides", "Fit the two sides of a set separately."
     )
-    patterns_per_class: str | None = option(
-        "--patterns NUMBER|auto",
-        "Number of patterns of each class; auto chooses it per class.",
-    )
-    shrinkage: Any = option(
-        "--shrinkage", "Shrinkage of the off-diagonal scatter, 0 to 1.", type=float
-    )
-    entry: Any = option("--entry", "Gain that a further input must bring.", type=float)
     costs: Sequence[str] = several(
         "--cost COLUMN=COST", "Cost of computing a column (repeat)."
-    )
-    choices: Any = option(
-        "--validate",
-        "Setting to choose by inner cross-validation (repeat).",
-        choices=["alpha", "l_max", "shrinkage", "entry"],
-        multiple=True,
     )
     rows_per_class: Any = option(
         "--rows-per-class",
@@ -124,9 +141,6 @@ class LearnOptions(RepresentationOptions):
     )
     seed: int = option(
         "--seed", "Random seed for the cross-validation folds.", default=0
-    )
-    keep_reversals: Any = flag(
-        "--keep-reversals", "Let a wide set take back the far tails of others."
     )
     missing: Any = option(
         "--missing",
@@ -149,9 +163,8 @@ def command(options: LearnOptions) -> None:
     several, the states of all parts of a table, which `fuzzytree collect` wrote. Files
     of any length are read in bounded memory. The accuracy is
     cross-validated: it is that of trees learnt without the rows that they are tested
-    on, with settings that each fold chooses anew. In a table of more than 32,768
-    numbers the folds take the settings chosen from all rows, and are made of 20,000
-    rows at most. Of states, and of a table with more than 2^25 numbers, it is an
+    on, and each fold chooses anew how to split and to prune; the folds are made of
+    20,000 rows at most. Of states, and of a table with more than 2^25 numbers, it is an
     estimate from the rows that are kept, as the supports of leaves are.
     """
     form = wanted_format(options.output, None)
@@ -170,7 +183,7 @@ def _learnt(
     options: LearnOptions, *, is_state: bool
 ) -> tuple[FuzzyTree, Lines, object]:
     """Return a tree of all rows, what to say about it, and the facts."""
-    from fuzzytree.api import accuracy, learn_table
+    from fuzzytree.api import accuracy, front, learn_table
     from fuzzytree.learning import remarks
     from fuzzytree.report import counted, depth
     from fuzzytree.tables import Table
@@ -201,17 +214,47 @@ def _learnt(
     if found.weights is not None and learnt.report.rows_sampled < learnt.report.rows:
         text = "from the rows that were kept; `collect --for` counts all rows"
         rows.append(("estimated", "supports of leaves", text))
-    tested = None
+    tested = small = None
+    if options.front is not None:
+        check_place(options.front)
     if not options.no_test:
         begin = time.perf_counter()
         with progress_bar(quiet=is_silent) as show:
-            tested = accuracy(
-                found, settings, learnt.report, seed=settings.seed, progress=show
-            )
+            tested = accuracy(found, settings, seed=settings.seed, progress=show)
         said = _timed(_accuracy_text(tested, found), begin)
         rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
+        small = front(found, settings)
+        rows += _front_rows(small)
+    if options.front is not None:
+        rows.append(_drawn(small, options.front, _title(options)))
     facts = _summary(found, noticed, learnt, tested, settings.seed, options.output)
+    facts = msgspec.structs.replace(facts, front=small)
     return tree, rows, facts
+
+
+def _front_rows(small: Front | None) -> Lines:
+    """Return the choice between small trees: a line for each number of leaves."""
+    if small is None:
+        return []
+    heads, *lines = str(small).splitlines()
+    rows = [("choice", "columns a node", heads.removeprefix("leaves "))]
+    for place, line in enumerate(lines):
+        if place == 0 or line[7:] != lines[place - 1][7:]:
+            rows.append(("", f"{small.leaves[place]} leaves", line[7:]))
+    return rows
+
+
+def _drawn(small: Front | None, path: str, name: str) -> tuple[str, str, str]:
+    """Draw the choice between small trees, and return a line about it."""
+    from fuzzytree.report import draw_front
+
+    if small is None:
+        raise click.UsageError(
+            "--front needs a table of twenty rows or more, the default mode, and a test"
+        )
+    picture = draw_front(small, title=f"{name}: accuracy of small trees")
+    write_atomically(path, picture.svg.encode())
+    return "drew", path, "the accuracy of small trees"
 
 
 def _counted(
@@ -388,10 +431,6 @@ def _settings(options: LearnOptions) -> LearningSettings:
         column: _parsed("--cost", column, text, float)
         for column, text in _pairs("--cost", options.costs)
     }
-    patterns = options.patterns_per_class
-    if patterns is not None and patterns != "auto":
-        number = _parsed("--patterns", "NUMBER|auto", patterns, int)
-        values["patterns_per_class"] = number
     with wrong_options():
         return LearningSettings(**values)
 
@@ -441,7 +480,6 @@ def _summary(
         majority=majority(table),
         folds=tested.folds if tested else None,
         rows_tested=tested.rows if tested else None,
-        is_nested=tested.is_nested if tested else None,
         seed=seed,
         report=learnt.report,
     )
@@ -471,9 +509,8 @@ def _accuracy_text(tested: Accuracy | None, table: Table) -> str:
     kept = f"the {len(table.codes):,} rows that were kept of "
     part = f" on {tested.rows:,} of {kept if table.weights is not None else ''}"
     part = f"{part}{tested.of:,} rows" if tested.rows < tested.of else ""
-    how = "" if tested.is_nested else ", settings chosen on all rows"
     span = f"{min(tested.folds):.3f} to {max(tested.folds):.3f}"
-    return f"cross-validated ({baseline}; {folds}{part}{how}: {span})"
+    return f"cross-validated ({baseline}; {folds}{part}: {span})"
 
 
 def _timed(text: str, begin: float) -> str:

@@ -1,5 +1,6 @@
 from .findings import LearningReport as LearningReport
 from .findings import remarks as remarks
+from .front import Front as Front
 from .learner import ArrayLearner as ArrayLearner
 from .learner import Learnt as Learnt
 from .learner import learn_arrays as learn_arrays

@@ -123,6 +123,8 @@ def assembled(
     *,
     points: int,
     separate_sides: bool,
+    keeps_flaws: bool,
+    supports: FloatArray,
 ) -> AssembledTree:
     """Return the frozen tree of a sketch.
 
@@ -133,9 +135,12 @@ def assembled(
         names: For people.
         points: n of the 2n + 1 windows.
         separate_sides: Whether a set's sides are fitted apart.
+        keeps_flaws: Whether a polynomial that leaves [0, 1] or rises stays.
+        supports: How many rows of the table reach each leaf.
     """
     keys = [_key(split.axis, node) for node, split in enumerate(sketch.splits)]
-    axes = _axis_sets(sketch, keys, patterns, statistics, points, separate_sides)
+    fit = _Fit(patterns, statistics, points, separate_sides, keeps_flaws)
+    axes = _axis_sets(sketch, keys, fit)
     flanks, largest = _all_flanks(sketch, keys, axes)
     called = _axis_names(axes, names)
     pattern_names = _pattern_names(patterns, names)
@@ -155,7 +160,7 @@ def assembled(
         classes=tuple(names.classes),
         variables=tuple(variables),
         nodes=nodes,
-        leaves=_leaves(sketch, patterns, names, pattern_names),
+        leaves=_leaves(sketch, supports, names, pattern_names),
         sets=tuple(_frozen_sets(called[k], a, pattern_names) for k, a in axes.items()),
         columns=tuple(names.columns),
     )
@@ -185,13 +190,19 @@ def _added(parts: Sequence[SetRepairs]) -> SetRepairs:
     )
 
 
+@dataclass(frozen=True)
+class _Fit:
+    """What sets are fitted to, and how."""
+
+    patterns: Patterns
+    statistics: Statistics
+    points: int
+    separate_sides: bool
+    keeps_flaws: bool
+
+
 def _axis_sets(
-    sketch: Sketch,
-    keys: Sequence[_Key],
-    patterns: Patterns,
-    statistics: Statistics,
-    points: int,
-    separate_sides: bool,
+    sketch: Sketch, keys: Sequence[_Key], fit: _Fit
 ) -> dict[_Key, _AxisSets]:
     """Fit the sets of every pattern on every axis that divides it."""
     groups_of: dict[_Key, list[IntArray]] = {}
@@ -200,26 +211,13 @@ def _axis_sets(
         groups_of.setdefault(key, []).extend(split.groups)
         axis_of[key] = split.axis
     return {
-        key: _sets_on(
-            axis_of[key],
-            np.unique(np.concatenate(groups)),
-            patterns,
-            statistics,
-            points,
-            separate_sides,
-        )
+        key: _sets_on(axis_of[key], np.unique(np.concatenate(groups)), fit)
         for key, groups in groups_of.items()
     }
 
 
-def _sets_on(
-    axis: SplitAxis,
-    chosen: IntArray,
-    patterns: Patterns,
-    statistics: Statistics,
-    points: int,
-    separate_sides: bool,
-) -> _AxisSets:
+def _sets_on(axis: SplitAxis, chosen: IntArray, fit: _Fit) -> _AxisSets:
+    patterns = fit.patterns
     members = patterns.members(chosen)
     values = axis.values(patterns.rows[members])
     owners = np.searchsorted(chosen, patterns.owners[members])
@@ -227,16 +225,22 @@ def _sets_on(
     unit, usual = _Unit(), 1.0
     if not axis.is_combined:
         feature = int(axis.features[0])
-        totals = _with_classes(totals, chosen, patterns, statistics.totals(feature))
+        totals = _with_classes(totals, chosen, patterns, fit.statistics.totals(feature))
         unit, usual = _Unit.of(axis, patterns.units), float(patterns.scale[feature])
-    counts = window_counts(values, owners, totals, points)
+    counts = window_counts(values, owners, totals, fit.points)
     means = totals.means()
     spreads = totals.spreads(unit.exponent)
     is_zero = ~(spreads > 0)
     floor = np.maximum(ZERO_SPREAD_SHARE * usual, 8 * unit.ulp(means))
     widths = np.where(is_zero, floor, np.maximum(spreads, unit.ulp(means)))
     moved = totals.means(unit.origin, unit.exponent)
-    fitted = fitted_sets(moved, widths, counts, separate_sides=separate_sides)
+    fitted = fitted_sets(
+        moved,
+        widths,
+        counts,
+        separate_sides=fit.separate_sides,
+        keeps_flaws=fit.keeps_flaws,
+    )
     place = {int(p): k for k, p in enumerate(chosen)}
     zeros = int(np.count_nonzero(is_zero))
     return _AxisSets(axis, unit, chosen, place, means, fitted, zeros)
@@ -559,19 +563,15 @@ def _combination(
 
 def _leaves(
     sketch: Sketch,
-    patterns: Patterns,
+    supports: FloatArray,
     names: TermNames,
     pattern_names: Sequence[str],
 ) -> tuple[Leaf, ...]:
-    reached = sketch.descend(patterns.rows)
-    support = np.bincount(
-        reached, weights=patterns.row_weights, minlength=len(sketch.leaves)
-    )
     return tuple(
         Leaf(
             names.classes[label],
             " or ".join(pattern_names[int(p)] for p in owned),
-            round(float(support[leaf])),
+            round(float(supports[leaf])),
         )
         for leaf, (owned, label) in enumerate(
             zip(sketch.leaves, sketch.leaf_classes, strict=True)

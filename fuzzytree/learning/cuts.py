@@ -1,26 +1,23 @@
 """Where a decision changes on one axis.
 
-Between groups of patterns a cut stands where the densities of the groups cross: of the
-gaussians with the patterns' means and spreads (`crossing_cuts`), or of the rows
-themselves, smoothed (`smoothed_cuts`). A cut never lies on a value of the table.
+Between groups of patterns a cut stands where the densities of the groups cross, taken
+for gaussians (`crossing_cuts`). A cut never lies on a value of the table.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
 
-from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
+from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray
 
 NEGLIGIBLE = 0.01
 """An outer interval that holds less of each of its patterns is a far reversal."""
 
 _ENVELOPE = 48
-_GRID = 256
 
 
 @dataclass(frozen=True)
@@ -159,133 +156,6 @@ def tail(u: FloatArray) -> FloatArray:
     v = np.minimum(np.abs(u), 37.0)
     upper = 0.5 * np.exp(-v * (0.717 + 0.416 * v))
     return np.where(u >= 0, upper, 1.0 - upper)
-
-
-def smoothed_cuts(
-    values: FloatArray, is_right: BoolArray, weights: FloatArray, *, two: bool
-) -> SplitCuts:
-    """Return the cuts that separate two groups of rows with the least error.
-
-    The weights of both groups are counted on a grid and smoothed by a gaussian, so
-    that a cut does not follow single rows.
-
-    Args:
-        values: The rows on the axis.
-        is_right: Which rows belong to group 1; the others belong to group 0.
-        weights: Of the rows.
-        two: Whether two cuts may be placed, the outer group owning both outer
-            intervals; they must save 3 % of the smaller group's weight.
-    """
-    sides = [_Extent.of(values[is_right]), _Extent.of(values[~is_right])]
-    low, high = _robust_range(sides)
-    step = (high - low) / _GRID
-    if not step > 0:
-        middle = float(np.median(values))
-        return SplitCuts(np.array([middle]), np.array([0, 1]))
-    with np.errstate(over="ignore"):  # so far away lies in the last place anyway
-        place = np.clip((values - low) / step, 0, _GRID - 1).astype(np.int64)
-    signed = np.where(is_right, weights, -weights)
-    counted: FloatArray = np.bincount(place, signed, _GRID).astype(np.float64)
-    balance = _smoothed(counted, min(_bandwidth(sides), _GRID * step) / step)
-    gain = np.concatenate([[0.0], np.cumsum(balance)])
-    edges: FloatArray = low + step * np.arange(_GRID + 1, dtype=np.float64)
-    rising = _best_place(-gain)
-    falling = _best_place(gain)
-    ahead, behind = gain[-1] - gain[rising], gain[falling]
-    if ahead >= behind:
-        best, position, owners = ahead, rising, [0, 1]
-    else:
-        best, position, owners = behind, falling, [1, 0]
-    single = SplitCuts(edges[position : position + 1], np.array(owners))
-    if not two:
-        return single
-    smaller = min(weights[is_right].sum(), weights[~is_right].sum())
-    return _two_cuts(gain, edges, best + 0.03 * smaller) or single
-
-
-def _best_place(score: FloatArray) -> int:
-    """Return the middle of the places with the largest score, ends left out."""
-    inner = score[1:-1]
-    highest = float(inner.max())
-    best = np.flatnonzero(inner >= highest - 1e-12 * (1.0 + abs(highest)))
-    runs = np.split(best, np.flatnonzero(np.diff(best) > 1) + 1)
-    longest = max(runs, key=len)
-    return int(longest[len(longest) // 2]) + 1
-
-
-def _two_cuts(gain: FloatArray, edges: FloatArray, at_least: float) -> SplitCuts | None:
-    """Return the best inner interval for one group, if it is good enough."""
-    best: SplitCuts | None = None
-    for sign, owners in ((1.0, [0, 1, 0]), (-1.0, [1, 0, 1])):
-        lows = np.minimum.accumulate(sign * gain)
-        rise = sign * gain - lows
-        stop = int(rise.argmax())
-        start = int(np.argmin(sign * gain[: stop + 1]))
-        outside = 0.0 if sign > 0 else gain[-1]
-        saved = rise[stop] + outside
-        if saved > at_least and 0 < start < stop < len(gain) - 1:
-            at_least = saved
-            best = SplitCuts(edges[[start, stop]], np.array(owners))
-    return best
-
-
-@dataclass(frozen=True)
-class _Extent:
-    """Where a group of rows lies: its ends, quartiles, spread and size."""
-
-    low: float
-    quarter: float
-    half: float
-    three: float
-    high: float
-    spread: float
-    size: int
-
-    @staticmethod
-    def of(group: FloatArray) -> _Extent:
-        """Return the extent of a group that holds a row at least."""
-        size = len(group)
-        ordered = np.sort(group)
-        low, quarter, half, three, high = ordered[
-            [0, (size - 1) // 4, (size - 1) // 2, 3 * (size - 1) // 4, size - 1]
-        ].tolist()
-        spread = math.sqrt(float(((group - half) ** 2).mean()))
-        return _Extent(low, quarter, half, three, high, spread, size)
-
-
-def _robust_range(sides: Sequence[_Extent]) -> tuple[float, float]:
-    """Return an extent of both groups that a few outliers do not widen."""
-    low, high = math.inf, -math.inf
-    for side in sides:
-        reach = 4.0 * max(side.three - side.quarter, 1e-6 * abs(side.half))
-        low = min(low, max(side.low, side.quarter - reach))
-        high = max(high, min(side.high, side.three + reach))
-    margin = 1e-3 * (high - low)
-    return low - margin, high + margin
-
-
-def _bandwidth(sides: Sequence[_Extent]) -> float:
-    """Return the width of smoothing: Silverman's, of the narrower group."""
-    widths: list[float] = []
-    for side in sides:
-        middle = (side.three - side.quarter) / 1.349
-        spread = min(side.spread, middle) if middle > 0 else side.spread
-        widths.append(1.06 * spread * side.size**-0.2)
-    return min(widths)
-
-
-def _smoothed(counts: FloatArray, width: float) -> FloatArray:
-    """Return counts convolved with a gaussian of a width in grid steps."""
-    if width < 0.3:
-        return counts
-    reach = min(len(counts) - 1, int(4 * width) + 1)
-    offsets = np.arange(-reach, reach + 1)
-    kernel = np.exp(-0.5 * (offsets / width) ** 2)
-    full = np.convolve(counts, kernel / kernel.sum()).astype(np.float64)
-    inner = full[reach : reach + len(counts)].copy()
-    inner[0] += full[:reach].sum()
-    inner[-1] += full[reach + len(counts) :].sum()
-    return inner
 
 
 def settled_cuts(

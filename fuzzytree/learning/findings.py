@@ -59,14 +59,10 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
     classes_without_rows: tuple[str, ...]
     features_ignored: tuple[str, ...]
     patterns: dict[str, int]
-    patterns_refused: int
     single_rows: int
     zero_spreads: int
     leaves: int
     features_per_node: tuple[int, ...]
-    inseparable: int
-    levels_raised: int
-    reversals: int
     sets: int
     off_peak: int
     empty_centre: int
@@ -75,6 +71,10 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
     overshooting: int
     rising: int
     largest_flank_error: float
+    patterns_refused: int = 0
+    inseparable: int = 0
+    levels_raised: int = 0
+    reversals: int = 0
     chosen: dict[str, float | str] = {}
     inner_accuracy: float | None = None
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -12,16 +13,26 @@ import numpy.typing as npt
 from fuzzytree.cells import numbers_only, unmasked
 from fuzzytree.errors import LearningError
 from fuzzytree.learning.assembly import AssembledTree, TermNames, assembled
-from fuzzytree.learning.filling import codes_of_positions, described, filled
+from fuzzytree.learning.choosing import chosen_tree
+from fuzzytree.learning.cuts import Sketch
+from fuzzytree.learning.filling import (
+    FilledStatistics,
+    codes_of_positions,
+    described,
+    filled,
+)
 from fuzzytree.learning.findings import LearningReport
-from fuzzytree.learning.growing import GrownTree
-from fuzzytree.learning.patterns import usable_features
+from fuzzytree.learning.finishing import finished_tree
+from fuzzytree.learning.front import Front, front_of
+from fuzzytree.learning.nodes import SplitRules
+from fuzzytree.learning.paper import GrowthRules, grow
+from fuzzytree.learning.patterns import Patterns, usable_features, wanted_patterns
 from fuzzytree.learning.probabilities import with_probabilities
+from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
-from fuzzytree.learning.units import FloatArray, IntArray
-from fuzzytree.learning.validation import ChosenTree, chosen_tree
+from fuzzytree.learning.units import FloatArray, IntArray, tallied
 from fuzzytree.model import FuzzyTree, text_fault
 
 Progress = Callable[[str, float], None]
@@ -168,49 +179,126 @@ class ArrayLearner:
         Raises:
             LearningError: If there is no row, one class, or no column that varies.
         """
+        ready = self._prepared()
+        sample, moments = ready.sample, ready.moments
+        progress = progress or _silent
+        grow = self._paper if self.settings.mode == "paper" else self._default
+        grown = grow(ready, progress)
+        names = TermNames(self.name, self.columns, self.classes, self.units)
+        progress("fitting sets", 0.0)
+        made = assembled(
+            grown.sketch,
+            grown.patterns,
+            ready.table.statistics,
+            names,
+            points=self.settings.points,
+            separate_sides=self.settings.separate_sides,
+            keeps_flaws=self.settings.mode == "paper",
+            supports=grown.supports,
+        )
+        progress("fitting sets", 1.0)
+        places = {name: place for place, name in enumerate(self.columns)}
+        tree = with_probabilities(
+            made.tree,
+            sample,
+            ready.counts,
+            places,
+            accuracy=grown.facts.get("inner_accuracy"),
+        )
+        if self.settings.mode != "paper":
+            tree = described(tree, self.columns, ready.table, self.statistics)
+        return Learnt(tree, self._report(moments, sample, grown, made))
+
+    def front(self) -> Front | None:
+        """Return how accurate small trees are, by columns a node and by leaves.
+
+        None where rows are too few to hold some out, or of too many classes.
+
+        Raises:
+            LearningError: As `finish`.
+        """
+        rows, rules = self._rules(self._prepared())
+        every = replace(rules, columns=len(self.columns))
+        return front_of(rows, every, self.settings)
+
+    def _prepared(self) -> _Ready:
+        """Return what a tree is grown from."""
         drops = self.settings.drops_missing
         check_rows(self.statistics, self.classes, self.statistics.dropped)
         if self.settings.mode == "paper":
             _refuse_texts(self.categories)
         categories = [self.categories.get(name, ()) for name in self.columns]
         table = filled(self.statistics, categories, drops=drops)
-        statistics, dropped = table.statistics, self.statistics.dropped
+        dropped = self.statistics.dropped
         if dropped and not (drops or np.isfinite(table.stand_ins).any()):
             raise LearningError(_INCOMPLETE.format(dropped))
-        check_rows(statistics, self.classes, dropped)
-        sample = statistics.sample()
-        moments = statistics.moments(sample.units)
+        check_rows(table.statistics, self.classes, dropped)
+        sample = table.statistics.sample()
+        moments = table.statistics.moments(sample.units)
         _check_columns(moments)
         costs = np.array([self.settings.costs.get(c, 1.0) for c in self.columns])
-        choice = chosen_tree(
-            moments, sample, self.settings, self.classes, costs, progress
-        )
-        names = TermNames(self.name, self.columns, self.classes, self.units)
-        if progress is not None:
-            progress("fitting sets", 0.0)
-        made = assembled(
-            choice.grown.sketch,
-            choice.patterns,
-            statistics,
-            names,
-            points=self.settings.points,
-            separate_sides=self.settings.separate_sides,
-        )
-        if progress is not None:
-            progress("fitting sets", 1.0)
-        places = {name: place for place, name in enumerate(self.columns)}
         counts = moments.counts if drops else self.statistics.counts()
-        tree = with_probabilities(
-            made.tree, sample, counts, places, accuracy=choice.accuracy
+        return _Ready(table, sample, moments, counts, costs)
+
+    def _rules(self, ready: _Ready) -> tuple[TrainingRows, SplitRules]:
+        """Return the rows as the search for splits needs them, and its rules."""
+        settings, sample = self.settings, ready.sample
+        kept = np.bincount(sample.codes, minlength=len(self.classes))
+        weights = (ready.counts / np.maximum(kept, 1))[sample.codes]
+        rows = TrainingRows.of(sample, weights, len(self.classes), ready.table.sizes)
+        rules = SplitRules(
+            min_rows=settings.min_rows or min(_MIN_ROWS, int(kept[kept > 0].min())),
+            columns=settings.columns or len(self.columns),
+            entry=settings.entry,
+            shrinkage=settings.shrinkage,
+            costs=ready.costs,
         )
-        if self.settings.mode != "paper":
-            tree = described(tree, self.columns, table, self.statistics)
-        return Learnt(tree, self._report(moments, sample, choice, made))
+        return rows, rules
+
+    def _paper(self, ready: _Ready, progress: Progress) -> _Grown:
+        """Grow the paper's tree, over patterns of the classes."""
+        settings = self.settings
+        wanted = settings.patterns_per_class or 1
+        numbers = [
+            wanted if isinstance(wanted, int) else wanted.get(name, 1)
+            for name in self.classes
+        ]
+        patterns, refused = wanted_patterns(ready.moments, ready.sample, numbers)
+        rules = GrowthRules(
+            alpha=0.9 if settings.alpha is None else settings.alpha,
+            l_max=settings.l_max or 4.0,
+            costs=ready.costs,
+            keep_reversals=settings.keep_reversals,
+        )
+        grown = grow(patterns, rules, lambda share: progress("growing", share))
+        leaves = grown.sketch.descend(patterns.rows)
+        size = len(grown.sketch.leaves)
+        supports = tallied(leaves, patterns.row_weights, size)
+        facts: dict[str, Any] = {
+            "patterns_refused": refused,
+            "inseparable": grown.inseparable,
+            "levels_raised": grown.levels_raised,
+            "reversals": grown.reversals,
+        }
+        return _Grown(grown.sketch, patterns, supports, facts)
+
+    def _default(self, ready: _Ready, progress: Progress) -> _Grown:
+        """Grow a tree from the rows' own classes."""
+        rows, rules = self._rules(ready)
+        choice = chosen_tree(rows, rules, self.settings, progress)
+        found = finished_tree(choice.tree, rows, ready.sample, ready.moments)
+        weights = rows.weights * (ready.counts.sum() / rows.weights.sum())
+        supports = tallied(found.leaves, weights, len(found.sketch.leaves))
+        facts: dict[str, Any] = {
+            "chosen": {"splits": _STYLES[choice.style]},
+            "inner_accuracy": choice.accuracy,
+        }
+        return _Grown(found.sketch, found.patterns, supports, facts)
 
     def _report(
-        self, moments: Moments, sample: Sample, choice: ChosenTree, made: AssembledTree
+        self, moments: Moments, sample: Sample, grown: _Grown, made: AssembledTree
     ) -> LearningReport:
-        patterns, grown = choice.patterns, choice.grown
+        patterns = grown.patterns
         usable = set(usable_features(moments).tolist())
         per_class = np.bincount(patterns.labels, minlength=len(self.classes))
         drops, dropped = self.settings.drops_missing, self.statistics.dropped
@@ -231,14 +319,10 @@ class ArrayLearner:
             patterns={
                 c: int(n) for c, n in zip(self.classes, per_class, strict=True) if n
             },
-            patterns_refused=choice.refused,
             single_rows=int(np.count_nonzero(patterns.moments.counts == 1)),
             zero_spreads=made.zero_spreads,
             leaves=len(made.tree.leaves),
-            features_per_node=_features_per_node(grown),
-            inseparable=grown.inseparable,
-            levels_raised=grown.levels_raised,
-            reversals=grown.reversals,
+            features_per_node=_features_per_node(grown.sketch),
             sets=made.sets,
             off_peak=made.repairs.off_peak,
             empty_centre=made.repairs.empty_centre,
@@ -247,13 +331,46 @@ class ArrayLearner:
             overshooting=made.repairs.overshooting,
             rising=made.repairs.rising,
             largest_flank_error=made.largest_flank_error,
-            chosen=choice.chosen,
-            inner_accuracy=choice.accuracy,
+            **grown.facts,
         )
 
 
-def _features_per_node(grown: GrownTree) -> tuple[int, ...]:
-    return tuple(len(split.axis.features) for split in grown.sketch.splits)
+@dataclass(frozen=True)
+class _Ready:
+    """A table without missing cells, its rows, moments, counts of classes and costs."""
+
+    table: FilledStatistics
+    sample: Sample
+    moments: Moments
+    counts: IntArray
+    costs: FloatArray
+
+
+@dataclass(frozen=True)
+class _Grown:
+    """A tree over patterns, the rows that each leaf stands for, and what to report."""
+
+    sketch: Sketch
+    patterns: Patterns
+    supports: FloatArray
+    facts: dict[str, Any]
+
+
+_MIN_ROWS = 3
+
+_STYLES = {
+    "columns": "single columns",
+    "mixed": "columns and combinations",
+    "centres": "combinations between the classes",
+}
+
+
+def _silent(_: str, __: float) -> None:
+    """Report nothing."""
+
+
+def _features_per_node(sketch: Sketch) -> tuple[int, ...]:
+    return tuple(len(split.axis.features) for split in sketch.splits)
 
 
 def _check_names(

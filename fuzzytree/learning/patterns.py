@@ -7,19 +7,14 @@ random.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.statistics import Moments, grouped_moments
 from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray
-
-SCATTER_NUMBERS = 1 << 23
-"""Scatter matrices are kept per pattern up to this many numbers (64 MiB)."""
-
-MOST_COMBINABLE = 512
-"""Combinations look at no more features than this."""
 
 _ROUNDS = 25
 
@@ -41,13 +36,8 @@ class Patterns:
         row_weights: How many rows of the table each sample row stands for.
         starts: Where each pattern's rows begin, and their end; shape (patterns + 1,).
         units: The columns' units.
-        centre: The origin of standard units, per feature.
-        scale: The unit of standard units, per feature: a spread within patterns.
-        scatter: Covariance per pattern in standard units, shape (patterns, features,
-            features); one for all (shape (1, ...)) if there are too many.
+        scale: The pooled spread within the classes, per feature.
         usable: The features that are not constant and do not overflow.
-        combinable: Those of them that combinations may use: all, or the most powerful
-            ones of very many.
     """
 
     labels: IntArray
@@ -60,11 +50,8 @@ class Patterns:
     row_weights: FloatArray
     starts: IntArray
     units: ColumnUnits
-    centre: FloatArray
     scale: FloatArray
-    scatter: FloatArray
     usable: IntArray
-    combinable: IntArray
 
     @property
     def size(self) -> int:
@@ -163,10 +150,8 @@ def _finished(
     ):
         target[whole] = source[labels[whole]]
     usable = usable_features(moments)
-    centre, scale = standard_units(moments, usable)
+    _, scale = standard_units(moments, usable)
     starts = np.searchsorted(owners, np.arange(size + 1)).astype(np.int64)
-    combinable = _most_powerful(own, weights, scale, usable)
-    scatter = _scatter(moved, starts, scale, combinable)
     return Patterns(
         labels,
         numbers,
@@ -178,52 +163,67 @@ def _finished(
         row_weights[labels[owners]],
         starts,
         sample.units,
-        centre,
         scale,
-        scatter,
         usable,
-        combinable,
     )
 
 
-def _most_powerful(
-    moments: Moments, weights: FloatArray, scale: FloatArray, usable: IntArray
-) -> IntArray:
-    """Return the usable features, the most powerful ones if they are too many."""
-    if len(usable) <= MOST_COMBINABLE:
-        return usable
-    means = moments.means[:, usable]
-    share = (weights / weights.sum())[:, None]
-    middle = (share * means).sum(axis=0)
-    power = np.sqrt((share * (means - middle) ** 2).sum(axis=0)) / scale[usable]
-    leading = np.argsort(-power, kind="stable")[:MOST_COMBINABLE]
-    return np.sort(usable[leading])
+def wanted_patterns(
+    moments: Moments, sample: Sample, numbers: Sequence[int]
+) -> tuple[Patterns, int]:
+    """Return patterns with so many clusters a class, and how many were refused.
 
-
-def _scatter(
-    rows: FloatArray,
-    starts: IntArray,
-    scale: FloatArray,
-    usable: IntArray,
-) -> FloatArray:
-    """Return covariances of some features, per pattern or for all together."""
-    width, size = len(usable), len(starts) - 1
-    is_apart = size * width * width <= SCATTER_NUMBERS
-    found = np.zeros((size if is_apart else 1, width, width))
-    if width == 0:
-        return found
-    for pattern in range(size):
-        piece = rows[starts[pattern] : starts[pattern + 1]][:, usable]
-        if len(piece) < 2:
+    Args:
+        moments: Of the classes.
+        sample: Their rows.
+        numbers: Patterns wanted, per class.
+    """
+    usable = usable_features(moments)
+    centre, scale = standard_units(moments, usable)
+    borders = np.searchsorted(sample.codes, np.arange(len(moments.counts) + 1))
+    clusters: dict[int, IntArray] = {}
+    refused = 0
+    for code, number in enumerate(numbers):
+        rows = sample.moved[borders[code] : borders[code + 1]]
+        if number < 2 or len(rows) == 0:
             continue
-        piece = (piece - piece[0]) / scale[usable]
-        piece -= piece.mean(axis=0)
-        product = piece.T @ piece
-        if is_apart:
-            found[pattern] = product / (len(piece) - 1)
-        else:
-            found[0] += product
-    return found if is_apart else found / max(1, len(rows) - size)
+        points = (rows[:, usable] - centre[usable]) / scale[usable]
+        clusters[code] = clusters_of(points, number)
+        refused += number - 1 - int(clusters[code].max(initial=0))
+    return make_patterns(moments, sample, clusters), refused
+
+
+def leaf_patterns(
+    moments: Moments, sample: Sample, leaves: IntArray, labels: IntArray
+) -> tuple[Patterns, IntArray]:
+    """Return the patterns that the leaves of a tree hold, and that of each leaf.
+
+    A class with one leaf is its pattern whole. Of a class with several, each leaf is a
+    pattern of the rows of the class that reach it; those that reach leaves of other
+    classes belong to none.
+
+    Args:
+        moments: Of the classes.
+        sample: Rows kept, ordered by class.
+        leaves: The leaf that each of them reaches.
+        labels: The class of each leaf.
+    """
+    classes = len(moments.counts)
+    sizes = np.bincount(labels, minlength=classes)
+    order = np.argsort(labels, kind="stable")
+    rank = np.empty(len(labels), np.int64)
+    rank[order] = np.arange(len(labels)) - np.searchsorted(labels[order], labels[order])
+    counts = np.where(sizes > 0, moments.counts, 0)
+    labelled = replace(moments, counts=counts)
+    is_own = (sizes[sample.codes] == 1) | (labels[leaves] == sample.codes)
+    kept = np.flatnonzero(is_own & (sizes[sample.codes] > 0))
+    mine = sample.at(kept)
+    clusters = {
+        int(code): rank[leaves[kept]][mine.codes == code]
+        for code in np.flatnonzero(sizes > 1)
+    }
+    firsts = np.cumsum(sizes) - sizes
+    return make_patterns(labelled, mine, clusters), firsts[labels] + rank
 
 
 def clusters_of(rows: FloatArray, count: int) -> IntArray:

@@ -13,7 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from fuzzytree.learning.units import FloatArray, IntArray
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 REACH = 5.0
 """Where a set's tail ends, in spreads."""
@@ -83,7 +83,12 @@ def _side(u: FloatArray, curve: FloatArray) -> FloatArray:
 
 
 def fitted_sets(
-    means: FloatArray, spreads: FloatArray, counts: IntArray, *, separate_sides: bool
+    means: FloatArray,
+    spreads: FloatArray,
+    counts: IntArray,
+    *,
+    separate_sides: bool,
+    keeps_flaws: bool,
 ) -> FittedSets:
     """Fit LR sets to window counts.
 
@@ -92,6 +97,8 @@ def fitted_sets(
         spreads: SD of each pattern, above 0.
         counts: S(-n) to S(n), shape (patterns, 2n + 1).
         separate_sides: Whether left and right are fitted apart; else their mean is.
+        keeps_flaws: Whether a polynomial that leaves [0, 1] or rises stays, as in the
+            paper; else a line to its last point replaces it.
     """
     n = (counts.shape[1] - 1) // 2
     centre = counts[:, n].astype(np.float64)
@@ -112,8 +119,12 @@ def fitted_sets(
         lowered += int(np.count_nonzero(points > falling))
         curve = _interpolated(falling)
         over, up = _flaws(curve)
-        overshooting += over
-        rising += up
+        overshooting += int(np.count_nonzero(over))
+        rising += int(np.count_nonzero(up))
+        if not keeps_flaws:
+            straight = np.zeros_like(curve)
+            straight[:, 0] = 1.0 - falling[:, -1]
+            curve = np.where((over | up)[:, None], straight, curve)
         curves.append(curve)
     repairs = SetRepairs(
         off_peak=int(np.count_nonzero(largest > centre)),
@@ -158,11 +169,11 @@ def _inverse(n: int) -> FloatArray:
     return np.array(rows)
 
 
-def _flaws(curve: FloatArray) -> tuple[int, int]:
-    """Return how many polynomials leave [0, 1], and how many rise."""
+def _flaws(curve: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """Return which polynomials leave [0, 1], and which rise."""
     t = np.linspace(0.0, 1.0, _SAMPLES)
     powers = np.vander(2.0 * t - 1.0, curve.shape[1], increasing=True)
     values = 1.0 - t * (curve @ powers.T)
     out = (values < -_TOLERANCE) | (values > 1.0 + _TOLERANCE)
     up = np.diff(values, axis=1) > _TOLERANCE
-    return int(out.any(axis=1).sum()), int(up.any(axis=1).sum())
+    return np.asarray(out.any(axis=1)), np.asarray(up.any(axis=1))

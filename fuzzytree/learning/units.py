@@ -74,3 +74,8 @@ def units_of(rows: FloatArray, lows: FloatArray, highs: FloatArray) -> ColumnUni
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+
+
+def tallied(groups: IntArray, weights: FloatArray, size: int) -> FloatArray:
+    """Return the weight of each group, 0 to `size` - 1."""
+    return np.bincount(groups, weights, size).astype(np.float64, copy=False)

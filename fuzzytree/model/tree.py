@@ -213,9 +213,9 @@ def _expand(
 def interval_names(nodes_cuts: Sequence[Sequence[float]]) -> list[list[str]]:
     """Return a name for each interval of each node that tests one variable.
 
-    A variable that one node tests, with two or three intervals, has the terms low,
-    (medium) and high. Otherwise a term is named by its bounds, with as few digits
-    (three at least) as tell all the cuts apart.
+    A variable with at most four different cuts has words for what lies between them,
+    such as low, medium and high. Otherwise an interval is named by its bounds, with as
+    few digits (three at least) as tell all the cuts apart.
 
     Args:
         nodes_cuts: The cuts of each node that tests the variable.
@@ -223,19 +223,34 @@ def interval_names(nodes_cuts: Sequence[Sequence[float]]) -> list[list[str]]:
     Example:
         >>> interval_names([[2.45]])
         [['low', 'high']]
-        >>> interval_names([[1.7512], [0.8, 1.7]])
-        [['below 1.75', 'above 1.75'], ['below 0.8', '0.8 to 1.7', 'above 1.7']]
+        >>> interval_names([[2.45], [4.75]])
+        [['low', 'medium or high'], ['low or medium', 'high']]
     """
-    words = {1: ["low", "high"], 2: ["low", "medium", "high"]}
-    if len(nodes_cuts) == 1 and len(nodes_cuts[0]) in words:
-        return [words[len(nodes_cuts[0])]]
-    text = _short_numbers({cut for cuts in nodes_cuts for cut in cuts})
+    every = sorted({cut for cuts in nodes_cuts for cut in cuts})
+    if len(every) in _WORDS:
+        return [_in_words(cuts, every) for cuts in nodes_cuts]
+    text = _short_numbers({*every})
     names: list[list[str]] = []
     for cuts in nodes_cuts:
         shown = [text[cut] for cut in cuts]
         inner = [f"{a} to {b}" for a, b in itertools.pairwise(shown)]
         names.append([f"below {shown[0]}", *inner, f"above {shown[-1]}"])
     return names
+
+
+_WORDS = {
+    1: ("low", "high"),
+    2: ("low", "medium", "high"),
+    3: ("very low", "low", "high", "very high"),
+    4: ("very low", "low", "medium", "high", "very high"),
+}
+"""What lies between so many cuts, in words."""
+
+
+def _in_words(cuts: Sequence[float], every: Sequence[float]) -> list[str]:
+    places = [0, *(every.index(cut) + 1 for cut in cuts), len(every) + 1]
+    words = _WORDS[len(every)]
+    return [" or ".join(words[a:b]) for a, b in itertools.pairwise(places)]
 
 
 def _short_numbers(values: set[float]) -> dict[float, str]:

@@ -33,6 +33,7 @@ from .sarif import annotation_lines as annotation_lines
 from .sarif import sarif_text as sarif_text
 from .stability import stability_lines as stability_lines
 from .svg_bench import work_precision as work_precision
+from .svg_front import draw_front as draw_front
 from .svg_reliability import draw_reliability as draw_reliability
 from .svg_tree import draw_tree as draw_tree
 from .text import agreement_lines as agreement_lines

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from fuzzytree.api import holdout
 from fuzzytree.api.holdout import Accuracy, accuracy, folds_of, majority, sampled
-from fuzzytree.api.verbs import learn_table
-from fuzzytree.learning import LearningSettings, Learnt, learn_arrays
+from fuzzytree.learning import LearningSettings
 from fuzzytree.tables import Table, read_table
 
 
@@ -24,9 +21,7 @@ def _table(rows: int, *, classes: int = 2) -> Table:
 def _accuracy(
     table: Table, settings: LearningSettings | None = None
 ) -> Accuracy | None:
-    wanted = settings or LearningSettings()
-    report = learn_table(table, name="t", units={}, settings=wanted).report
-    return accuracy(table, wanted, report)
+    return accuracy(table, settings or LearningSettings())
 
 
 def test_each_fold_holds_each_class_in_its_share() -> None:
@@ -69,39 +64,11 @@ def test_at_most_20_000_rows_are_tested() -> None:
     assert (result.rows, result.of) == (20_000, 50_000)
 
 
-@pytest.mark.one_in(2)
-@pytest.mark.parametrize("cells", [119, 120])
-def test_folds_of_a_large_table_take_the_settings_chosen_on_all_rows(
-    monkeypatch: pytest.MonkeyPatch, cells: int
-) -> None:
-    used: list[LearningSettings] = []
-
-    def learn(*args: Any, settings: LearningSettings, **more: Any) -> Learnt:
-        used.append(settings)
-        return learn_arrays(*args, settings=settings, **more)
-
-    table = read_table(
-        np.random.default_rng(0).normal(size=(60, 2)) ** 2,
-        target=np.random.default_rng(1).integers(0, 2, 60),
-    )
-    wanted = LearningSettings(choices=("alpha", "entry"))
-    report = learn_table(table, name="t", units={}, settings=wanted).report
-    monkeypatch.setattr(holdout, "CHOOSING_CELLS", cells)
-    monkeypatch.setattr(holdout, "learn_arrays", learn)
-    result = accuracy(table, wanted, report)
-    assert result is not None
-    assert result.is_nested == (cells == 120)
-    chosen = LearningSettings(
-        patterns_per_class=report.patterns,
-        alpha=float(report.chosen["alpha"]),
-        entry=float(report.chosen["entry"]),
-    )
-    assert used == [wanted if cells == 120 else chosen] * 5
-
-
 def test_patterns_of_a_class_that_a_fold_lacks_are_no_error() -> None:
     table = read_table(np.arange(21.0)[:, None], target=["a"] * 10 + ["b"] * 10 + ["c"])
-    result = _accuracy(table, LearningSettings(patterns_per_class={"a": 2, "c": 1}))
+    result = _accuracy(
+        table, LearningSettings(mode="paper", patterns_per_class={"a": 2, "c": 1})
+    )
     assert result is not None
 
 
@@ -124,10 +91,7 @@ def test_a_class_of_one_row_is_answered_wrong_and_not_an_error() -> None:
 def test_progress_is_reported_fold_by_fold() -> None:
     steps: list[str] = []
     table = _table(20)
-    report = learn_table(table, name="t", units={}, settings=LearningSettings()).report
-    accuracy(
-        table, LearningSettings(), report, progress=lambda text, _: steps.append(text)
-    )
+    accuracy(table, LearningSettings(), progress=lambda text, _: steps.append(text))
     assert steps == [f"testing fold {k} of 5" for k in range(1, 6)]
 
 
@@ -147,10 +111,6 @@ def test_a_table_of_100_000_columns_is_tested_in_two_folds() -> None:
     columns = tuple(f"x{number}" for number in range(100_000))
     codes = np.repeat([0, 1], 10)
     table = Table("wide", columns, values, ("a", "b"), codes)
-    settings = LearningSettings()
-    report = learn_arrays(
-        values.T, codes, columns=columns, classes=["a", "b"], settings=settings
-    ).report
-    result = accuracy(table, settings, report)
+    result = accuracy(table, LearningSettings())
     assert result is not None
     assert result.folds == (1.0, 1.0)

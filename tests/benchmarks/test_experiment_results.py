@@ -27,11 +27,11 @@ def is_within(study: Study, stated: float) -> bool:
 @pytest.mark.parametrize(
     ("name", "features", "settings", "stated", "floor"),
     [
-        ("postures", "log paper", LearningSettings(patterns_per_class=1), 0.689, 0.6),
+        ("postures", "log paper", LearningSettings(), 0.689, 0.6),
         (
             "postures",
             "log orientation",
-            LearningSettings(patterns_per_class=1),
+            LearningSettings(),
             0.789,
             0.7,
         ),

@@ -128,11 +128,10 @@ def test_settings_are_chosen_by_subjects_that_are_not_tested() -> None:
 
 def test_the_settings_that_carry_over_to_other_people_are_chosen() -> None:
     random = np.random.default_rng(1)
-    codes = np.tile([0, 1], 60)
-    places = 8.0 * random.integers(0, 3, 120) + 4.0 * codes  # in turn, like a comb
-    values = np.array([places + random.normal(0.0, 0.5, 120)])
+    values = random.normal(size=(2, 120))
+    codes = (values.sum(axis=0) > 0).astype(np.int64)
     subject = np.repeat(np.arange(6), 20)
-    few = (Candidate(1, 0.1, 2.0), Candidate(3, 0.1, 2.0))
+    few = (Candidate(0.1, 1e9), Candidate(0.1, 2.0))
     assert chosen(values, codes, subject, LearningSettings(), few) == few[1]
 
 

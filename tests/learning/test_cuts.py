@@ -13,7 +13,6 @@ from fuzzytree.learning.cuts import (
     SplitCuts,
     crossing_cuts,
     settled_cuts,
-    smoothed_cuts,
     without_empty,
 )
 
@@ -71,28 +70,6 @@ def test_crossings_scale_with_the_axis(scale: float) -> None:
     cuts, owners, _ = crossings([0.0, 4.0 * scale], [scale, scale])
     assert cuts == pytest.approx([2.0 * scale], rel=1e-6)
     assert owners == [0, 1]
-
-
-def test_rows_are_cut_where_their_densities_cross() -> None:
-    rng = np.random.default_rng(1)
-    values = np.concatenate([rng.normal(0, 1, 2000), rng.normal(4, 1, 2000)])
-    found = smoothed_cuts(
-        values, np.repeat([False, True], 2000), np.ones(4000), two=True
-    )
-    assert found.owners.tolist() == [0, 1]
-    assert found.cuts[0] == pytest.approx(2.0, abs=0.15)
-
-
-def test_rows_of_a_ring_take_two_cuts_and_one_cut_if_two_are_not_allowed() -> None:
-    rng = np.random.default_rng(2)
-    values = np.concatenate([rng.normal(0, 1, 500), rng.normal(0, 8, 500)])
-    is_right = np.repeat([False, True], 500)
-    assert smoothed_cuts(values, is_right, np.ones(1000), two=True).owners.tolist() == [
-        1,
-        0,
-        1,
-    ]
-    assert len(smoothed_cuts(values, is_right, np.ones(1000), two=False).cuts) == 1
 
 
 @given(

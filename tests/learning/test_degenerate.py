@@ -6,7 +6,6 @@ Warnings are errors in all tests, so each of these is learnt without one.
 from __future__ import annotations
 
 import itertools
-from fractions import Fraction
 from typing import Literal
 
 import msgspec
@@ -15,10 +14,7 @@ import pytest
 
 from fuzzytree.errors import LearningError
 from fuzzytree.learning import ArrayLearner, LearningSettings, Learnt, learn_arrays
-from fuzzytree.learning.combination import fisher_direction, node_view
-from fuzzytree.learning.patterns import Patterns, make_patterns
-from fuzzytree.learning.statistics import Statistics
-from fuzzytree.learning.units import FloatArray, IntArray
+from fuzzytree.learning.units import FloatArray
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import degree, descend, evaluate
@@ -186,13 +182,6 @@ def test_many_strange_tables_are_learnt_or_refused() -> None:
         assert_a_strange_table_is_learnt(seed)
 
 
-def patterns_of(values: FloatArray, labels: IntArray) -> Patterns:
-    statistics = Statistics(int(labels.max()) + 1, values.shape[1])
-    statistics.update(values, labels)
-    sample = statistics.sample()
-    return make_patterns(statistics.moments(sample.units), sample, {})
-
-
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("noise", [0.0, 2.0**-40, 2.0**-20, 2.0**-10])
 def test_nearly_equal_columns_get_no_weights_out_of_proportion(noise: float) -> None:
@@ -222,53 +211,6 @@ def test_a_difference_that_tells_all_is_found_beside_what_hides_it() -> None:
         tree = learn_arrays(values, labels, columns=["a", "b"], classes=["0", "1"]).tree
         right = np.array(labels_of(tree, values)) == labels.astype(str)
         assert right.mean() > 0.99, power
-
-
-@pytest.mark.parametrize("shrinkage", [1e-3, 1e-8])
-@pytest.mark.parametrize("offset", [0.0, 2.0**40])
-@pytest.mark.parametrize("noise", [0.0, 2.0**-9, 2.0**-3])
-def test_directions_over_nearly_equal_columns_are_those_of_exact_arithmetic(
-    noise: float, offset: float, shrinkage: float
-) -> None:
-    rng = np.random.default_rng(0)
-    labels = np.repeat([0, 1], 40)
-    first = np.round(rng.normal(size=80) * 1024) / 1024 + labels
-    second = first + np.round(rng.normal(size=80)) * noise
-    patterns = patterns_of(np.column_stack([first, second]) + offset, labels)
-    view = node_view(patterns, np.array([0, 1]), shrinkage)
-    found = fisher_direction(view, np.array([False, True]))
-    exact = exact_direction(patterns, Fraction(shrinkage))
-    largest = max(abs(float(weight)) for weight in exact)
-    # Solving loses as many digits as 1 / shrinkage has; 16 - 3 or 16 - 8 are left.
-    allowed = 64 * 2.0**-52 / shrinkage * largest
-    assert np.abs(found - [float(weight) for weight in exact]).max() <= allowed
-
-
-def exact_direction(patterns: Patterns, shrinkage: Fraction) -> list[Fraction]:
-    """Return W^-1 (m1 - m0) of two patterns and columns in rational numbers."""
-    scales = [Fraction(v) for v in patterns.scale.tolist()]
-    groups = [
-        [
-            [Fraction(v) / s for v, s in zip(row, scales, strict=True)]
-            for row in patterns.moved[patterns.members(np.array([k]))].tolist()
-        ]
-        for k in (0, 1)
-    ]
-    means = [[sum(c) / len(c) for c in zip(*g, strict=True)] for g in groups]
-
-    def covariance(i: int, j: int) -> Fraction:
-        products = sum(
-            (row[i] - mean[i]) * (row[j] - mean[j])
-            for group, mean in zip(groups, means, strict=True)
-            for row in group
-        )
-        shrunk = 1 if i == j else 1 - shrinkage
-        return Fraction(products) / (len(groups[0]) + len(groups[1]) - 2) * shrunk
-
-    (a, b), d = (covariance(0, 0), covariance(0, 1)), covariance(1, 1)
-    u, v = means[1][0] - means[0][0], means[1][1] - means[0][1]
-    determinant = a * d - b * b
-    return [(d * u - b * v) / determinant, (a * v - b * u) / determinant]
 
 
 def test_masked_cells_and_labels_are_missing_to_the_learner() -> None:

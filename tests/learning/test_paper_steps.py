@@ -125,7 +125,9 @@ def test_windows_overlap_by_half_and_are_closed_at_both_ends() -> None:
 def test_a_set_goes_through_its_points() -> None:
     # S = 2, 6, 8, 6, 2: degrees 3/4 at half a spread and 1/4 at one.
     counts = np.array([[2, 6, 8, 6, 2]])
-    found = fitted_sets(np.array([0.0]), np.array([1.0]), counts, separate_sides=False)
+    found = fitted_sets(
+        np.array([0.0]), np.array([1.0]), counts, separate_sides=False, keeps_flaws=True
+    )
     degrees = found.degrees(np.array([0]), np.array([0.0, 0.5, -0.5, 1.0, 5.0]))
     assert np.allclose(degrees, [[1.0, 0.75, 0.75, 0.25, 0.0]], atol=1e-15)
 
@@ -134,15 +136,17 @@ def test_the_two_sides_are_averaged_unless_they_are_separate() -> None:
     counts = np.array([[2, 8, 6]])
     means, spreads = np.array([0.0]), np.array([1.0])
     ends = np.array([-1.0, 1.0])
-    same = fitted_sets(means, spreads, counts, separate_sides=False)
-    apart = fitted_sets(means, spreads, counts, separate_sides=True)
+    same = fitted_sets(means, spreads, counts, separate_sides=False, keeps_flaws=True)
+    apart = fitted_sets(means, spreads, counts, separate_sides=True, keeps_flaws=True)
     assert np.allclose(same.degrees(np.array([0]), ends), [[0.5, 0.5]])
     assert np.allclose(apart.degrees(np.array([0]), ends), [[0.25, 0.75]])
 
 
 def test_every_repair_of_a_set_is_counted() -> None:
     counts = np.array([[0, 9, 4, 9, 0], [5, 1, 0, 1, 5], [1, 2, 4, 2, 1]])
-    found = fitted_sets(np.zeros(3), np.ones(3), counts, separate_sides=False).repairs
+    found = fitted_sets(
+        np.zeros(3), np.ones(3), counts, separate_sides=False, keeps_flaws=True
+    ).repairs
     assert found.off_peak == 2
     assert found.empty_centre == 1
     assert found.clipped >= 1

@@ -21,7 +21,9 @@ FIRST: IntArray = np.array([0])
 
 
 def degrees(counts: list[int], points: list[float], *, apart: bool) -> list[float]:
-    fitted = fitted_sets(*ONE, np.array([counts]), separate_sides=apart)
+    fitted = fitted_sets(
+        *ONE, np.array([counts]), separate_sides=apart, keeps_flaws=True
+    )
     found: list[float] = fitted.degrees(FIRST, np.array(points))[0].tolist()
     return found
 
@@ -46,7 +48,9 @@ def test_a_set_is_one_at_its_mean_and_zero_from_its_reach_on() -> None:
 def test_every_repair_is_counted() -> None:
     counts = np.array([[0, 12, 10, 10, 10, 12, 0], [3, 2, 1, 0, 1, 2, 3]])
     means, spreads = np.zeros(2), np.ones(2)
-    repairs = fitted_sets(means, spreads, counts, separate_sides=False).repairs
+    repairs = fitted_sets(
+        means, spreads, counts, separate_sides=False, keeps_flaws=True
+    ).repairs
     assert repairs.off_peak == 2
     assert repairs.empty_centre == 1
     assert repairs.clipped == 1
@@ -58,7 +62,11 @@ def test_every_repair_is_counted() -> None:
 @given(st.lists(st.integers(0, 50), min_size=7, max_size=7))
 def test_degrees_are_those_of_the_reference(counts: list[int]) -> None:
     fitted = fitted_sets(
-        np.array([2.0]), np.array([0.3]), np.array([counts]), separate_sides=True
+        np.array([2.0]),
+        np.array([0.3]),
+        np.array([counts]),
+        separate_sides=True,
+        keeps_flaws=True,
     )
     shape = LR(
         2.0,

@@ -192,7 +192,9 @@ def _difference_text(frame: int, one: Answers, other: Answers, model: Model) -> 
     texts: list[str] = []
     for key, own in one.items():
         a, b = (np.asarray(f[frame]).tolist() for f in (own, other.get(key, own)))
-        if key == "features":
+        if key == "features" and len(a) != len(b):
+            texts.append(f"{len(a)} features, not {len(b)}")
+        elif key == "features":
             pairs = zip(model.inputs, map(repr, a), map(repr, b), strict=True)
             texts += [f"{name} {x}, not {y}" for name, x, y in pairs if x != y]
         elif a != b:

@@ -48,7 +48,7 @@ FAST = [find_runtime(name) for name in ("native", "native float32", "best-first"
 def wine() -> FuzzyTree:
     table = ROOT / "examples" / "wine" / "wine.csv"
     return ft.learn(
-        str(table), target="cultivar", settings=ft.LearningSettings(entry=25)
+        str(table), target="cultivar", settings=ft.LearningSettings(columns=1, leaves=4)
     )
 
 

@@ -84,7 +84,7 @@ def test_nothing_is_written_where_a_way_disagrees(
     capsys: Said, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def other(*given: object, **options: Any) -> Written:
-        return write_frames(learnt_tree(SMALL, ("S1",)), SMALL, **options)
+        return write_frames(learnt_tree(SMALL, ("S1",), classes=5), SMALL, **options)
 
     monkeypatch.setattr(onnx_frames, "write_frames", other)
     words = ["tactile", "export", "tree.yaml", "pad.onnx", *SIZE]

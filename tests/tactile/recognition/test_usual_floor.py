@@ -57,7 +57,7 @@ def test_features_that_are_not_divided_by_the_force_do_not() -> None:
 
 
 def test_few_presses_are_enough_for_the_usual_floor() -> None:
-    assert share_right(usual_recogniser(5), 1.0) >= 0.93
+    assert share_right(usual_recogniser(5), 1.0) >= 0.92
 
 
 @pytest.mark.heavy

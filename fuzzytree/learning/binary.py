@@ -1,0 +1,214 @@
+"""A tree of splits in two, grown from rows and pruned by cost and complexity."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fuzzytree.learning.cuts import TreeSplit
+from fuzzytree.learning.nodes import SplitRules
+from fuzzytree.learning.rows import TrainingRows
+from fuzzytree.learning.splitting import Style, best_split
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
+
+COSTS = np.array([0.0, *np.geomspace(0.5, 512.0, 31)])
+"""Costs of a leaf, in rows, that are tried: one leaf more must save so many."""
+
+
+@dataclass
+class BinaryTree:
+    """A tree in flat lists; node 0 is the root, and parents stand before children.
+
+    Attributes:
+        splits: Of each node; None for a leaf.
+        children: The nodes of the two branches; (0, 0) for a leaf.
+        labels: The class of most rows, by weight.
+        sizes: The weight of the rows of each node.
+        wrong: The weight of those of other classes.
+    """
+
+    splits: list[TreeSplit | None] = field(default_factory=list[TreeSplit | None])
+    children: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    labels: list[int] = field(default_factory=list[int])
+    sizes: list[float] = field(default_factory=list[float])
+    wrong: list[float] = field(default_factory=list[float])
+
+    @property
+    def leaves(self) -> int:
+        """How many leaves there are."""
+        return sum(split is None for split in self.splits)
+
+    def add(self, rows: TrainingRows, at: IntArray) -> int:
+        """Add a leaf of some rows and return its number."""
+        counts = tallied(rows.codes[at], rows.weights[at], rows.classes)
+        label = int(np.round(counts, 9).argmax())
+        self.splits.append(None)
+        self.children.append((0, 0))
+        self.labels.append(label)
+        self.sizes.append(float(counts.sum()))
+        self.wrong.append(float(counts.sum() - counts[label]))
+        return len(self.splits) - 1
+
+    def reaching(
+        self, rows: TrainingRows, at: IntArray, start: int = 0
+    ) -> dict[int, IntArray]:
+        """Return the rows that reach each node from a node on, where there are any."""
+        reached = {start: at}
+        todo = [start]
+        while todo:
+            node = todo.pop()
+            split = self.splits[node]
+            if split is None:
+                continue
+            inside = reached[node]
+            taken = split.branches(rows.values[inside])
+            for branch, child in enumerate(self.children[node]):
+                found = inside[taken == branch]
+                if len(found):
+                    reached[child] = found
+                    todo.append(child)
+        return reached
+
+    def answers(self, rows: TrainingRows, at: IntArray, start: int = 0) -> IntArray:
+        """Return the class that each row is given from a node on."""
+        found = np.zeros(rows.size, np.int64)
+        for node, inside in self.reaching(rows, at, start).items():
+            if self.splits[node] is None:
+                found[inside] = self.labels[node]
+        return found[at]
+
+    def kept(self, is_leaf: BoolArray) -> BinaryTree:
+        """Return the tree in which some nodes have become leaves."""
+        result = BinaryTree()
+        todo = [(0, -1, 0)]
+        while todo:
+            node, parent, branch = todo.pop()
+            place = len(result.splits)
+            ends = bool(is_leaf[node]) or self.splits[node] is None
+            result.splits.append(None if ends else self.splits[node])
+            result.children.append((0, 0))
+            result.labels.append(self.labels[node])
+            result.sizes.append(self.sizes[node])
+            result.wrong.append(self.wrong[node])
+            if parent >= 0:
+                pair = [*result.children[parent]]
+                pair[branch] = place
+                result.children[parent] = (pair[0], pair[1])
+            if not ends:
+                for k in (1, 0):
+                    todo.append((self.children[node][k], place, k))
+        return result
+
+
+def grown(
+    rows: TrainingRows,
+    at: IntArray,
+    rules: SplitRules,
+    style: Style,
+    depth: int,
+    progress: Callable[[float], None] | None = None,
+) -> BinaryTree:
+    """Return a tree that is grown until no split pays.
+
+    Args:
+        rows: To learn from.
+        at: Which of them.
+        rules: What a split must keep to.
+        style: What splits a node.
+        depth: How many nodes a path may have.
+        progress: Called with the share of rows that have a leaf.
+    """
+    tree = BinaryTree()
+    todo = [(tree.add(rows, at), at, 0)]
+    settled = 0
+    while todo:
+        node, inside, level = todo.pop()
+        split = best_split(rows, inside, rules, style) if level < depth else None
+        if split is None:
+            settled += len(inside)
+            if progress is not None:
+                progress(settled / len(at))
+            continue
+        taken = split.branches(rows.values[inside])
+        tree.splits[node] = split
+        parts = [inside[taken == 0], inside[taken == 1]]
+        left, right = (tree.add(rows, part) for part in parts)
+        tree.children[node] = (left, right)
+        todo += [(right, parts[1], level + 1), (left, parts[0], level + 1)]
+    return tree
+
+
+@dataclass(frozen=True)
+class Pruning:
+    """What each cost of a leaf leaves of a tree.
+
+    Attributes:
+        ends: Whether a node is a leaf then, shape (nodes, costs).
+        leaves: How many leaves are left, by cost.
+    """
+
+    ends: BoolArray
+    leaves: IntArray
+
+
+def pruning(tree: BinaryTree, costs: FloatArray) -> Pruning:
+    """Return which nodes become leaves for each cost of a leaf.
+
+    A node does where its branches save no more rows than their leaves cost.
+    """
+    size = len(tree.splits)
+    lost = np.zeros((size, len(costs)))
+    leaves = np.ones((size, len(costs)), np.int64)
+    ends = np.ones((size, len(costs)), bool)
+    for node in reversed(range(size)):
+        lost[node] = tree.wrong[node]
+        if tree.splits[node] is None:
+            continue
+        left, right = tree.children[node]
+        below, count = lost[left] + lost[right], leaves[left] + leaves[right]
+        stays = below + costs * (count - 1) < tree.wrong[node] - 1e-9
+        lost[node] = np.where(stays, below, lost[node])
+        leaves[node] = np.where(stays, count, 1)
+        ends[node] = ~stays
+    return Pruning(ends, leaves[0])
+
+
+def limited(tree: BinaryTree, most: int) -> list[BoolArray]:
+    """Return which nodes become leaves in the best trees of 1, 2, ... `most` leaves.
+
+    The best tree loses the fewest rows, and has no more leaves than it needs to.
+    """
+    size = len(tree.splits)
+    lost = np.full((size, most + 1), np.inf)
+    share = np.zeros((size, most + 1), np.int64)  # leaves of the left branch; 0: a leaf
+    for node in reversed(range(size)):
+        lost[node, 1:] = tree.wrong[node]
+        if tree.splits[node] is None:
+            continue
+        left, right = tree.children[node]
+        for count in range(2, most + 1):
+            parts = lost[left, 1:count] + lost[right, count - 1 : 0 : -1]
+            k = int(parts.argmin())
+            if parts[k] < lost[node, count - 1] - 1e-9:
+                lost[node, count], share[node, count] = parts[k], k + 1
+            else:
+                lost[node, count] = lost[node, count - 1]
+                share[node, count] = -1 if share[node, count - 1] else 0
+    return [_ends(tree, share, count) for count in range(1, most + 1)]
+
+
+def _ends(tree: BinaryTree, share: IntArray, count: int) -> BoolArray:
+    is_leaf = np.ones(len(tree.splits), bool)
+    todo = [(0, count)]
+    while todo:
+        node, leaves = todo.pop()
+        while share[node, leaves] < 0:  # no better than with one leaf less
+            leaves -= 1
+        first = int(share[node, leaves])
+        if first:
+            is_leaf[node] = False
+            left, right = tree.children[node]
+            todo += [(left, first), (right, leaves - first)]
+    return is_leaf

@@ -1,0 +1,345 @@
+"""Step 7 of the paper: the next powerful feature is linearly combined.
+
+A combination parts two groups of a node's rows. Columns enter it one after another, the
+most powerful first, until another one no longer helps (a partial F test); its weights
+are those of a penalised logistic regression on them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from fuzzytree.learning.cuts import SplitAxis, rounded_to, tail
+from fuzzytree.learning.nodes import Chosen, SplitRules, best_cut
+from fuzzytree.learning.rows import TrainingRows
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
+
+_MOST_ROWS = 4_000
+_MOST_COLUMNS = 64
+_NEWTON_STEPS = 6
+_AXES = 2
+_ROUNDS = 10
+_PLACES = 64
+_OUTER = 8
+_OWN = 1e-12
+_FINE = 1e-5
+_SMALLEST = 1e-6
+_ROWS_PER_COLUMN = 10
+_DIGITS = 9
+_CHEAPEST = 2.0**-100  # gains divided by it are finite
+
+
+def class_groups(node: Chosen, rules: SplitRules) -> list[BoolArray]:
+    """Return groups of whole classes, as a cut on a discriminant axis parts them."""
+    if node.classes == 2:
+        return [node.codes == 1]
+    found: list[BoolArray] = []
+    standard = node.rows.standard[node.at]
+    means, sizes, within = _centres(node, standard, rules.shrinkage)
+    for axis in _discriminant_axes(means, sizes, within, _AXES).T:
+        values = np.round(standard @ axis, _DIGITS)
+        cut = best_cut(node, values, rules.min_rows)
+        if cut is None:
+            continue
+        above = tallied(node.codes, node.weights * (values > cut[1]), node.classes)
+        is_right = 2 * above > sizes
+        if is_right.any() and not is_right.all():
+            found.append(is_right[node.codes])
+    return found
+
+
+def centred_groups(node: Chosen, shrinkage: float) -> list[BoolArray]:
+    """Return the groups of whole classes that a cut parts with the least loss.
+
+    Each class is taken for a gaussian cloud, all with the same scatter; what counts is
+    the expected number of rows on the wrong side for each bit that the cut tells.
+    """
+    if node.classes == 2:
+        return [node.codes == 1]
+    standard = node.rows.standard[node.at]
+    if not standard.shape[1]:
+        return []
+    means, sizes, within = _centres(node, standard, shrinkage)
+    power = (sizes @ (means - sizes @ means / sizes.sum()) ** 2) / np.diag(within)
+    leading = np.argsort(-power, kind="stable")[:_AXES]
+    singles = np.eye(len(power))[:, leading]
+    far = _solved(within, (means - sizes @ means / sizes.sum()).T)
+    distance = np.einsum("fk,kf->k", far, means - sizes @ means / sizes.sum())
+    outer = np.argsort(-np.round(distance, _DIGITS), kind="stable")[:_OUTER]
+    axes = [_discriminant_axes(means, sizes, within, 3), singles, far[:, outer]]
+    best, lowest = None, np.inf
+    seen: set[bytes] = set()
+    for axis in np.hstack(axes).T:
+        loss, is_right = _least_loss(means, sizes, within, axis)
+        for _ in range(_ROUNDS):
+            if is_right.tobytes() in seen:
+                break
+            seen.add(is_right.tobytes())
+            if loss < lowest:
+                best, lowest = is_right, loss
+            right, left = sizes * is_right, sizes * ~is_right
+            step = right @ means / right.sum() - left @ means / left.sum()
+            loss, is_right = _least_loss(means, sizes, within, _solved(within, step))
+    return [] if best is None else [best[node.codes]]
+
+
+def _least_loss(
+    means: FloatArray, sizes: FloatArray, within: FloatArray, axis: FloatArray
+) -> tuple[float, BoolArray]:
+    """Return the least loss of a cut between classes on an axis, and what is right."""
+    places = means @ axis
+    spread = math.sqrt(max(float(axis @ within @ axis), 1e-300))
+    order = np.argsort(np.round(places / spread, _DIGITS), kind="stable")
+    ordered, weights = places[order], sizes[order]
+    behind = np.arange(len(order) - 1)
+    if len(behind) > _PLACES:
+        behind = np.unique(np.linspace(0, len(order) - 2, _PLACES).astype(np.int64))
+    cuts = ordered[behind] / 2 + ordered[behind + 1] / 2
+    is_right = np.arange(len(order)) > behind[:, None]
+    distance = np.where(is_right, ordered - cuts[:, None], cuts[:, None] - ordered)
+    lost = tail(distance / spread) @ weights
+    share = np.cumsum(weights)[behind] / weights.sum()
+    bits = -share * np.log(share) - (1 - share) * np.log1p(-share)
+    losses = np.round((lost / weights.sum() + 1e-4) / bits, _DIGITS)
+    best = int(losses.argmin())
+    chosen = np.zeros(len(order), bool)
+    chosen[order] = is_right[best]
+    return float(losses[best]), chosen
+
+
+def _centres(
+    node: Chosen, standard: FloatArray, shrinkage: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the means of the classes, their weights, and the scatter within them."""
+    order = np.argsort(node.codes, kind="stable")
+    starts = np.searchsorted(node.codes[order], np.arange(node.classes))
+    weighted = standard[order] * node.weights[order][:, None]
+    sizes = tallied(node.codes, node.weights, node.classes)
+    means = np.add.reduceat(weighted, starts, axis=0) / sizes[:, None]
+    moved = standard[order] - means[node.codes[order]]
+    within = (moved * node.weights[order][:, None]).T @ moved
+    freedom = max(len(order) - node.classes, 1) / len(order)
+    return means, sizes, _shrunk(within / (sizes.sum() * freedom), shrinkage)
+
+
+def _shrunk(scatter: FloatArray, shrinkage: float) -> FloatArray:
+    diagonal = np.maximum(np.diag(scatter), 1e-6)
+    shrunk: FloatArray = scatter * (1.0 - shrinkage)
+    np.einsum("ii->i", shrunk)[:] = diagonal
+    return shrunk
+
+
+def _discriminant_axes(
+    means: FloatArray, sizes: FloatArray, within: FloatArray, count: int
+) -> FloatArray:
+    """Return Fisher's discriminant axes, the most powerful first; one a column."""
+    if not len(within):
+        return np.empty((0, 0))
+    values, vectors = np.linalg.eigh(within)
+    whitening = vectors / np.sqrt(np.maximum(values, 1e-9 * values.max()))
+    moved = (means - sizes @ means / sizes.sum()) * np.sqrt(sizes)[:, None]
+    spread = moved @ whitening
+    _, axes = np.linalg.eigh(spread.T @ spread)
+    count = min(len(means) - 1, count, axes.shape[1])
+    found = whitening @ axes[:, ::-1][:, :count]
+    largest = np.argmax(np.abs(np.round(found, _DIGITS)), axis=0)
+    axes = found * np.sign(found[largest, np.arange(count)])
+    return np.asarray(axes, np.float64)
+
+
+def _solved(scatter: FloatArray, step: FloatArray) -> FloatArray:
+    try:
+        solution = np.linalg.solve(scatter, step)
+    except np.linalg.LinAlgError:
+        solution = np.linalg.lstsq(scatter, step, rcond=1e-12)[0]
+    return solution.astype(np.float64, copy=False)
+
+
+def axis_towards(
+    node: Chosen, is_right: BoolArray, rules: SplitRules, *, is_fine: bool = False
+) -> SplitAxis | None:
+    """Return a combination of columns that parts two groups of a node's rows.
+
+    None where it would be a single column. Where there are many more rows than columns
+    a difference of columns that are nearly equal is worth a look too: `is_fine` takes
+    Fisher's direction with next to no shrinkage.
+
+    Args:
+        node: The rows.
+        is_right: Which of them belong to the second group.
+        rules: How many columns it may have, and what each must bring.
+        is_fine: Whether columns may be nearly equal.
+    """
+    step = 1 + len(node.at) // _MOST_ROWS
+    at, weights, sides = node.at[::step], node.weights[::step], is_right[::step]
+    points = node.rows.standard[at]
+    if points.shape[1] < 2 or sides.all() or not sides.any():
+        return None
+    costs = rules.costs[node.rows.combinable]
+    if is_fine:
+        if len(at) < _ROWS_PER_COLUMN * points.shape[1]:
+            return None
+        rules = replace(rules, shrinkage=_FINE * rules.shrinkage)
+    selected = selected_columns(points, sides, weights, rules, costs)
+    if len(selected) < 2:
+        return None
+    chosen = points[:, selected]
+    direction: FloatArray | None
+    if is_fine:
+        direction = _fisher_direction(chosen, sides, weights, rules.shrinkage)
+    else:
+        direction = logistic_direction(chosen, sides, weights, 1.0)
+    if direction is None:
+        return None
+    return axis_of(node.rows, selected, direction, _spread(chosen @ direction, sides))
+
+
+def _spread(places: FloatArray, is_right: BoolArray) -> float:
+    """Return the spread of two groups around their own means."""
+    middle = np.where(is_right, places[is_right].mean(), places[~is_right].mean())
+    return float(np.sqrt(np.mean((places - middle) ** 2)))
+
+
+def turned(
+    axis: SplitAxis, rows: TrainingRows, at: IntArray, is_right: BoolArray
+) -> SplitAxis | None:
+    """Return the logistic direction towards some rows over a combination's columns."""
+    selected = np.searchsorted(rows.combinable, axis.features)
+    points = rows.standard[np.ix_(at, selected)]
+    direction = logistic_direction(points, is_right, rows.weights[at], 1.0)
+    if direction is None:
+        return None
+    return axis_of(rows, selected, direction, _spread(points @ direction, is_right))
+
+
+def selected_columns(
+    points: FloatArray,
+    is_right: BoolArray,
+    weights: FloatArray,
+    rules: SplitRules,
+    costs: FloatArray,
+) -> IntArray:
+    """Return the columns of a combination, most powerful first.
+
+    A column enters if its partial F, divided by its cost, is at least `entry`.
+
+    Args:
+        points: In standard units, shape (rows, columns).
+        is_right: The group of each row.
+        weights: Of the rows.
+        rules: How many columns there may be, and the smallest partial F.
+        costs: Per column.
+    """
+    means, rest = _two_groups(points, is_right, weights, rules.shrinkage)
+    original = np.diag(rest).copy()
+    step = means[1] - means[0]
+    share = float(weights[is_right].sum() / weights.sum())
+    factor = share * (1.0 - share)
+    prices = np.maximum(costs, _CHEAPEST)
+    selected: list[int] = []
+    power = 0.0
+    for _ in range(min(rules.columns, _MOST_COLUMNS, len(step))):
+        variances = np.einsum("ii->i", rest)
+        is_free = variances > _OWN * original
+        is_free[selected] = False
+        gains = np.where(is_free, step**2 / np.where(is_free, variances, 1.0), 0.0)
+        best = int(np.argmax(np.round(gains / prices, 12)))
+        gain = float(gains[best])
+        freedom = max(len(points) - 2 - len(selected), 1.0)
+        helps = freedom * factor * gain / (1.0 + factor * power) / prices[best]
+        if gain <= 0.0 or (selected and helps < rules.entry):
+            break
+        selected.append(best)
+        power += gain
+        column = rest[:, best] / rest[best, best]
+        step = step - column * step[best]
+        rest = rest - np.outer(column, rest[best])
+    return np.array(selected or [0], np.int64)
+
+
+def _fisher_direction(
+    points: FloatArray, is_right: BoolArray, weights: FloatArray, shrinkage: float
+) -> FloatArray:
+    """Return W^-1 (mean of the right - mean of the left)."""
+    means, scatter = _two_groups(points, is_right, weights, shrinkage)
+    return _solved(scatter, means[1] - means[0])
+
+
+def _two_groups(
+    points: FloatArray, is_right: BoolArray, weights: FloatArray, shrinkage: float
+) -> tuple[list[FloatArray], FloatArray]:
+    """Return the means of two groups of rows, and the scatter within them."""
+    sides = weights * ~is_right, weights * is_right
+    means = [side @ points / side.sum() for side in sides]
+    moved = points - np.where(is_right[:, None], means[1], means[0])
+    scatter = (moved * weights[:, None]).T @ moved / weights.sum()
+    diagonal = np.maximum(np.diag(scatter), 1e-6)
+    shrunk: FloatArray = scatter * (1.0 - shrinkage)
+    np.einsum("ii->i", shrunk)[:] = diagonal
+    return means, shrunk
+
+
+def logistic_direction(
+    points: FloatArray, is_right: BoolArray, weights: FloatArray, ridge: float
+) -> FloatArray | None:
+    """Return the penalised logistic direction by Newton steps, or None if they fail.
+
+    Args:
+        points: In standard units, shape (rows, columns).
+        is_right: The side of each row.
+        weights: Of the rows.
+        ridge: Penalty on squared weights, in rows.
+    """
+    design = np.hstack([points, np.ones((len(points), 1))])
+    share = weights / weights.mean()
+    penalty = np.full(design.shape[1], ridge)
+    penalty[-1] = 1e-6
+    solution = np.zeros(design.shape[1])
+    for _ in range(_NEWTON_STEPS):
+        chance = 1.0 / (1.0 + np.exp(-np.clip(design @ solution, -30.0, 30.0)))
+        slope = design.T @ (share * (is_right - chance)) - penalty * solution
+        steep = share * np.maximum(chance * (1.0 - chance), 1e-4)
+        curvature = (design * steep[:, None]).T @ design + np.diag(penalty)
+        try:
+            step = np.linalg.solve(curvature, slope)
+        except np.linalg.LinAlgError:
+            return None
+        solution = solution + step
+        if np.abs(step).max() < 1e-3:
+            break
+    direction: FloatArray = solution[:-1]
+    return direction if np.isfinite(direction).all() and direction.any() else None
+
+
+def axis_of(
+    rows: TrainingRows, selected: IntArray, direction: FloatArray, unit: float
+) -> SplitAxis | None:
+    """Return an axis in the table's units from a direction in standard units.
+
+    Its unit is the spread of the groups that it parts. A weight is rounded so finely
+    that a spread of its column changes by no more than a thousandth of that unit.
+    Centres are the columns' origins, values of the table, so that the first step of an
+    axis, value less centre, has the digits that learning saw. None where fewer than two
+    columns have a weight.
+    """
+    columns = rows.combinable[selected]
+    longest = math.sqrt(float(direction @ direction))
+    length = max(unit, _SMALLEST * longest)
+    scales = rows.spreads[selected]
+    weights = np.array(
+        [
+            rounded_to(weight, -_DIGITS - math.frexp(scale)[1])
+            for weight, scale in zip(
+                (direction / length / scales).tolist(), scales.tolist(), strict=True
+            )
+        ]
+    )
+    keep = (weights != 0) & (np.abs(direction) > 1e-6 * np.abs(direction).max())
+    if np.count_nonzero(keep) < 2:
+        return None
+    chosen = columns[keep]
+    raw = np.ldexp(weights[keep], -rows.units.exponents[chosen])
+    return SplitAxis(chosen, raw, rows.units.origins[chosen], True)

@@ -1,0 +1,149 @@
+"""Rows to learn from, as the search for splits needs them: in bins, in standard units.
+
+A bin holds neighbouring values of one column, as many rows as another one; a column of
+few different values has one for each. The bins of all columns are numbered through.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fuzzytree.learning.sampling import Sample
+from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray
+
+MOST_SEARCHED = 4_096
+"""Splits by one column look at no more columns than this, the most powerful ones."""
+
+MOST_COMBINABLE = 512
+"""Combinations look at no more columns than this."""
+
+_BINS = 128
+_FAR = 8.0
+
+
+@dataclass(frozen=True)
+class TrainingRows:
+    """Rows with their classes and weights.
+
+    Attributes:
+        values: As in the table, shape (rows, columns).
+        moved: The same in the columns' units.
+        codes: The class of each row.
+        weights: How many rows of the table each stands for, times its own weight.
+        classes: How many classes there are.
+        units: The columns' units.
+        categories: By column, how many categories it has; 0 for numbers.
+        searched: The columns that splits look at.
+        bins: The number of each row's bin, shape (rows, searched).
+        owners: The searched column (its place in `searched`) of each bin.
+        starts: The first bin of each searched column, and their number.
+        combinable: The columns that combinations may use.
+        centres: Of the combinable columns, the origin of standard units.
+        spreads: Their units: standard deviations.
+        standard: The combinable columns in standard units, outliers drawn in.
+    """
+
+    values: FloatArray
+    moved: FloatArray
+    codes: IntArray
+    weights: FloatArray
+    classes: int
+    units: ColumnUnits
+    categories: IntArray
+    searched: IntArray
+    bins: IntArray
+    owners: IntArray
+    starts: IntArray
+    combinable: IntArray
+    centres: FloatArray
+    spreads: FloatArray
+    standard: FloatArray
+
+    @staticmethod
+    def of(
+        sample: Sample, weights: FloatArray, classes: int, categories: IntArray
+    ) -> TrainingRows:
+        """Prepare a sample.
+
+        Args:
+            sample: The rows.
+            weights: Of the rows.
+            classes: How many classes there are.
+            categories: By column, how many categories it has; 0 for numbers.
+        """
+        moved, units = sample.moved, sample.units
+        searched = _varying(sample, weights, MOST_SEARCHED)
+        bins, starts = _binned(moved, searched)
+        is_number = (categories <= 2) & units.is_combinable
+        combinable = searched[is_number[searched]]
+        if len(combinable) > MOST_COMBINABLE:
+            leading = _power(sample, weights, combinable)
+            order = np.argsort(-leading, kind="stable")[:MOST_COMBINABLE]
+            combinable = np.sort(combinable[order])
+        chosen = moved[:, combinable]
+        centres, spreads = chosen.mean(axis=0), chosen.std(axis=0)
+        spreads = np.where(spreads > 0, spreads, 1.0)
+        standard = np.clip((chosen - centres) / spreads, -_FAR, _FAR)
+        return TrainingRows(
+            sample.rows,
+            moved,
+            sample.codes,
+            weights / weights.mean(),
+            classes,
+            units,
+            categories,
+            searched,
+            bins,
+            np.repeat(np.arange(len(searched)), np.diff(starts)),
+            starts,
+            combinable,
+            centres,
+            spreads,
+            standard,
+        )
+
+    @property
+    def size(self) -> int:
+        """How many rows there are."""
+        return len(self.codes)
+
+
+def _varying(sample: Sample, weights: FloatArray, most: int) -> IntArray:
+    """Return the columns that vary, the most powerful ones if they are too many."""
+    lows, highs = sample.moved.min(axis=0), sample.moved.max(axis=0)
+    found = np.flatnonzero(sample.units.is_sound & (lows < highs)).astype(np.int64)
+    if len(found) <= most:
+        return found
+    order = np.argsort(-_power(sample, weights, found), kind="stable")[:most]
+    return np.sort(found[order])
+
+
+def _power(sample: Sample, weights: FloatArray, columns: IntArray) -> FloatArray:
+    """Return how much of each column's variance lies between the classes."""
+    values = sample.moved[:, columns]
+    starts = np.flatnonzero(np.diff(sample.codes, prepend=-1))
+    sizes = np.add.reduceat(weights, starts)[:, None]
+    sums = np.add.reduceat(values * weights[:, None], starts, axis=0)
+    middle = sums.sum(axis=0) / sizes.sum()
+    between = (sizes * (sums / sizes - middle) ** 2).sum(axis=0) / sizes.sum()
+    total = values.var(axis=0)
+    return np.where(total > 0, between / np.where(total > 0, total, 1.0), 0.0)
+
+
+def _binned(values: FloatArray, searched: IntArray) -> tuple[IntArray, IntArray]:
+    bins = np.empty((len(values), len(searched)), np.int64)
+    starts = np.zeros(len(searched) + 1, np.int64)
+    for place, column in enumerate(searched.tolist()):
+        ordered = np.sort(values[:, column])
+        is_last = np.ones(len(ordered), bool)
+        is_last[:-1] = ordered[1:] > ordered[:-1]
+        ends = ordered[is_last]
+        if len(ends) > _BINS:
+            ends = np.unique(
+                ordered[np.arange(1, _BINS + 1) * len(ordered) // _BINS - 1]
+            )
+        bins[:, place] = starts[place] + np.searchsorted(ends, values[:, column])
+        starts[place + 1] = starts[place] + len(ends)
+    return bins, starts
