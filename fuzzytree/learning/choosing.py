@@ -25,6 +25,7 @@ from fuzzytree.learning.units import FloatArray, IntArray
 _FOLDS = 5
 _REPEATS = 4
 _FEW_ROWS = 1_000
+_FEW_CELLS = 20_000
 _FEW_FOLDS = 2
 _FEWEST = 20
 _ROWS = 4_000
@@ -115,7 +116,8 @@ def folds_of_rows(rows: TrainingRows, seed: int, *, repeats: int) -> list[Fold]:
     number = _FOLDS if classes <= _MANY_CLASSES else _FEW_FOLDS
     width = max(1, len(rows.searched))
     most = max(400, 4 * classes, min(_ROWS, _CELLS // width))
-    repeats = max(1, min(repeats, _FEW_ROWS // rows.size))
+    few = min(_FEW_ROWS // rows.size, _FEW_CELLS // (rows.size * width))
+    repeats = max(1, min(repeats, few))
     folds: list[Fold] = []
     kept = np.zeros(0, np.int64)
     for repeat in range(repeats):

@@ -285,7 +285,7 @@ def _two_groups(
 def logistic_direction(
     points: FloatArray, is_right: BoolArray, weights: FloatArray, ridge: float
 ) -> FloatArray | None:
-    """Return the penalised logistic direction by Newton steps, or None if they fail.
+    """Return the penalised logistic direction, or None if Newton's steps fail.
 
     Args:
         points: In standard units, shape (rows, columns).
@@ -293,6 +293,33 @@ def logistic_direction(
         weights: Of the rows.
         ridge: Penalty on squared weights, in rows.
     """
+    solution = _logistic(points, is_right, weights, ridge)
+    if solution is None:
+        return None
+    direction: FloatArray = solution[:-1]
+    return direction if np.isfinite(direction).all() and direction.any() else None
+
+
+def logistic_cut(values: FloatArray, is_right: BoolArray, weights: FloatArray) -> float:
+    """Return where two groups on an axis are equally likely; infinite for nowhere.
+
+    It is that of a logistic regression, which single rows at the border move little.
+    """
+    middle = float(np.average(values, weights=weights))
+    spread = float(np.sqrt(np.average((values - middle) ** 2, weights=weights)))
+    if not 0.0 < spread < math.inf:
+        return math.inf
+    points = ((values - middle) / spread)[:, None]
+    solution = _logistic(points, is_right, weights, 0.1)
+    if solution is None or not solution[0] > 0.0:
+        return math.inf
+    return middle - spread * float(solution[1] / solution[0])
+
+
+def _logistic(
+    points: FloatArray, is_right: BoolArray, weights: FloatArray, ridge: float
+) -> FloatArray | None:
+    """Return the weights of a logistic regression and its constant."""
     design = np.hstack([points, np.ones((len(points), 1))])
     share = weights / weights.mean()
     penalty = np.full(design.shape[1], ridge)
@@ -310,8 +337,7 @@ def logistic_direction(
         solution = solution + step
         if np.abs(step).max() < 1e-3:
             break
-    direction: FloatArray = solution[:-1]
-    return direction if np.isfinite(direction).all() and direction.any() else None
+    return solution
 
 
 def axis_of(

@@ -15,7 +15,12 @@ from typing import Literal
 import numpy as np
 
 from fuzzytree.learning.cuts import SplitAxis, TreeSplit, single
-from fuzzytree.learning.directions import axis_towards, centred_groups, class_groups
+from fuzzytree.learning.directions import (
+    axis_towards,
+    centred_groups,
+    class_groups,
+    logistic_cut,
+)
 from fuzzytree.learning.nodes import (
     DIGITS,
     Chosen,
@@ -228,13 +233,14 @@ def _placed(
         return None
     if is_right is None:
         return best_cut(node, values, rules.min_rows)
-    codes = is_right.astype(np.int64)
-    groups = Chosen(node.rows, node.at, codes, node.weights, 2)
-    found = best_cut(groups, values, rules.min_rows)
-    if found is None:
+    cut = logistic_cut(values, is_right, node.weights)
+    above = values > cut
+    size = int(np.count_nonzero(above))
+    if min(size, len(above) - size) < rules.min_rows:
         return None
-    counts = _counts(node, (values > found[1]).astype(np.int64), 2)
-    return float(information(counts).sum()), found[1]
+    cut = between(float(values[~above].max()), float(values[above].min()))
+    counts = _counts(node, above.astype(np.int64), 2)
+    return float(information(counts).sum()), cut
 
 
 def _looked_ahead(
