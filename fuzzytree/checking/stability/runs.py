@@ -238,9 +238,10 @@ def missing_rows(model: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
         [False, True, True]
     """
     kind = np.dtype(np.float32 if dtype == "float32" else np.float64)
-    values = filled_values(model.variables, values)
     with np.errstate(all="ignore"):
-        axes = dict(zip(model.inputs, values.astype(kind), strict=True))
+        rounded = values.astype(kind).astype(np.float64)  # what overflows is missing
+        rounded = filled_values(model.variables, rounded)
+        axes = dict(zip(model.inputs, rounded.astype(kind), strict=True))
         known = np.ones(values.shape[1], np.bool_)
         for variable in model.variables:
             total = axes.get(variable.name)

@@ -153,6 +153,9 @@ def _variable(variable: Variable, units: UnitChange) -> Variable:
         low=None if variable.low is None else units.place(name, variable.low),
         high=None if variable.high is None else units.place(name, variable.high),
         parts=tuple(units.part(variable, part) for part in variable.parts),
+        missing=None
+        if variable.missing is None
+        else units.place(name, variable.missing),
     )
 
 

@@ -243,3 +243,12 @@ def test_the_learner_counts_windows_exactly() -> None:
         return [int(k) for k in counted(values, groups, totals, n)[0]]
 
     assert window_counts(count).verdict == "holds"
+
+
+def test_a_learnt_tree_passes_with_what_stands_for_missing_values() -> None:
+    table = Path(__file__).resolve().parents[3] / "examples" / "wine" / "wine.csv"
+    tree = ft.learn(str(table), target="cultivar")
+    assert all(variable.missing is not None for variable in tree.variables[:1])
+    only = ["N1", "N2b", "N6"]
+    found = ft.stability(tree, only=only, runtimes=["native", "native float32"])
+    assert {c.verdict for c in found.criteria if c.code in only} == {"holds"}
