@@ -67,8 +67,11 @@ def _as_numbers(
         frame = nw.from_native(X, eager_only=True)
     except TypeError:
         return X, {}, ()
-    names = [name for name in frame.columns if not frame[name].dtype.is_numeric()]
-    if not names or len(set(frame.columns)) < len(frame.columns):
+    if len(set(frame.columns)) < len(frame.columns):
+        return X, {}, ()
+    types = zip(frame.columns, frame.schema.dtypes(), strict=True)
+    names = [name for name, kind in types if not kind.is_numeric()]
+    if not names:
         return X, {}, ()
     title, values = "X", dict.fromkeys(map(str, names), np.zeros(len(frame)))
     categories: dict[str, tuple[str, ...]] = {}

@@ -96,7 +96,7 @@ def _best_column(
     """Return the best split by one column and its score."""
     rows = node.rows
     size = len(rows.owners)
-    if size * node.classes > _MOST_CELLS:
+    if not size or size * node.classes > _MOST_CELLS:
         return None
     scores = _bin_scores(node, rules.min_rows)
     if not np.isfinite(scores).any():
@@ -248,7 +248,8 @@ def _looked_ahead(
 ) -> TreeSplit | None:
     """Return the first of two splits that help together, if they help much more."""
     rows = node.rows
-    if node.classes > _LOOK_PLACES or len(node.at) < 4 * rules.min_rows:
+    is_small = len(node.at) < 4 * rules.min_rows
+    if not len(rows.owners) or node.classes > _LOOK_PLACES or is_small:
         return None
     scores = np.full(len(rows.searched), -np.inf)
     np.maximum.at(scores, rows.owners, _bin_scores(node, rules.min_rows))
