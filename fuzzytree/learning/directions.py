@@ -276,10 +276,7 @@ def _two_groups(
     means = [side @ points / side.sum() for side in sides]
     moved = points - np.where(is_right[:, None], means[1], means[0])
     scatter = (moved * weights[:, None]).T @ moved / weights.sum()
-    diagonal = np.maximum(np.diag(scatter), 1e-6)
-    shrunk: FloatArray = scatter * (1.0 - shrinkage)
-    np.einsum("ii->i", shrunk)[:] = diagonal
-    return means, shrunk
+    return means, _shrunk(scatter, shrinkage)
 
 
 def logistic_direction(
