@@ -25,14 +25,12 @@ class BinaryTree:
         splits: Of each node; None for a leaf.
         children: The nodes of the two branches; (0, 0) for a leaf.
         labels: The class of most rows, by weight.
-        sizes: The weight of the rows of each node.
-        wrong: The weight of those of other classes.
+        wrong: The weight of the rows of each node that are of other classes.
     """
 
     splits: list[TreeSplit | None] = field(default_factory=list[TreeSplit | None])
     children: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
     labels: list[int] = field(default_factory=list[int])
-    sizes: list[float] = field(default_factory=list[float])
     wrong: list[float] = field(default_factory=list[float])
 
     @property
@@ -47,9 +45,14 @@ class BinaryTree:
         self.splits.append(None)
         self.children.append((0, 0))
         self.labels.append(label)
-        self.sizes.append(float(counts.sum()))
         self.wrong.append(float(counts.sum() - counts[label]))
         return len(self.splits) - 1
+
+    def attach(self, parent: int, branch: int, child: int) -> None:
+        """Make a node the branch of another one; the root has the parent -1."""
+        if parent >= 0:
+            left, right = self.children[parent]
+            self.children[parent] = (left, child) if branch else (child, right)
 
     def reaching(
         self, rows: TrainingRows, at: IntArray, start: int = 0
@@ -90,12 +93,8 @@ class BinaryTree:
             result.splits.append(None if ends else self.splits[node])
             result.children.append((0, 0))
             result.labels.append(self.labels[node])
-            result.sizes.append(self.sizes[node])
             result.wrong.append(self.wrong[node])
-            if parent >= 0:
-                pair = [*result.children[parent]]
-                pair[branch] = place
-                result.children[parent] = (pair[0], pair[1])
+            result.attach(parent, branch, place)
             if not ends:
                 for k in (1, 0):
                     todo.append((self.children[node][k], place, k))

@@ -82,10 +82,7 @@ def _labelled(tree: BinaryTree, rows: TrainingRows, at: IntArray) -> BinaryTree:
             node = tree.children[node][int(taken[0])]
             split = tree.splits[node]
         place = result.add(rows, inside)
-        if parent >= 0:
-            pair = [*result.children[parent]]
-            pair[branch] = place
-            result.children[parent] = (pair[0], pair[1])
+        result.attach(parent, branch, place)
         if split is not None:
             result.splits[place] = split
             for k in (1, 0):
