@@ -162,7 +162,7 @@ def remarks(table: Table, ignoring: Callable[[str], str]) -> Iterator[tuple[str,
     for name, values in zip(table.columns, table.values, strict=True):
         if name in table.categories:
             yield from _rare(name, values, table.categories[name])
-        elif _is_identifier(name, values):
+        elif name not in table.dates and _is_identifier(name, values):
             text = "a different whole number in each row, as an identifier has"
             yield name, f"{text}; {ignoring(name)} leaves it out"
 
