@@ -66,6 +66,7 @@ def main() -> int:
     parser.add_argument("--run", nargs="*", choices=LEARNERS, metavar="LEARNER")
     parser.add_argument("--tables", nargs="+", metavar="TABLE")
     parser.add_argument("--all-tables", action="store_true", help="fuzzytree on n to z")
+    parser.add_argument("--again", action="store_true", help="measure what is known")
     parser.add_argument(
         "--seconds", type=float, default=tables.SECONDS, help="of a fold"
     )
