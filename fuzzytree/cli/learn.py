@@ -134,6 +134,11 @@ class LearnOptions(RepresentationOptions):
     costs: Sequence[str] = several(
         "--cost COLUMN=COST", "Cost of computing a column (repeat)."
     )
+    class_weight: Any = option(
+        "--class-weight",
+        "`balanced`: let all classes weigh the same, however many rows they have.",
+        choices=["balanced"],
+    )
     rows_per_class: Any = option(
         "--rows-per-class",
         "Largest number of rows per class that the learner keeps.",

@@ -105,6 +105,8 @@ class Fold:
 def folds_of_rows(rows: TrainingRows, seed: int, *, repeats: int) -> list[Fold]:
     """Return folds of a bounded part of the rows, with all classes in each part.
 
+    Copies of a row share a fold, or a tree would be tested on what it has seen.
+
     Args:
         rows: To learn from.
         seed: Moves the folds.
@@ -119,17 +121,35 @@ def folds_of_rows(rows: TrainingRows, seed: int, *, repeats: int) -> list[Fold]:
     few = min(_FEW_ROWS // rows.size, _FEW_CELLS // (rows.size * width))
     repeats = max(1, min(repeats, few))
     folds: list[Fold] = []
+    owners = _copies(rows)
     kept = np.zeros(0, np.int64)
     for repeat in range(repeats):
-        shuffled = hashed(np.arange(rows.size) + 1_000_003 * (seed + 1) + repeat)
+        shuffled = hashed(owners + 1_000_003 * (seed + 1) + repeat)
         order = np.argsort(shuffled, kind="stable")
         if repeat == 0:
             kept = np.sort(order[:most])
         order = order[np.isin(order, kept)]
         order = order[np.argsort(rows.codes[order], kind="stable")]
-        turn = np.arange(len(order)) % number
+        turn = np.cumsum(np.diff(owners[order], prepend=owners[order[0]]) != 0) % number
         folds += [Fold(order[turn != k], order[turn == k]) for k in range(number)]
     return folds
+
+
+def _copies(rows: TrainingRows) -> IntArray:
+    """Return a number for each row, the same for copies of one.
+
+    Equal rows are copies, and no coincidence, if some column has another value in at
+    least half of the distinct rows. They follow each other.
+    """
+    is_new = np.ones(rows.size, bool)
+    is_new[1:] = np.diff(rows.codes) != 0
+    is_new[1:] |= (rows.values[1:] != rows.values[:-1]).any(axis=1)
+    if not is_new.all():
+        distinct = rows.values[is_new].T
+        most = max((len(np.unique(column)) for column in distinct), default=0)
+        if 2 * most >= distinct.shape[1]:
+            return np.cumsum(is_new) - 1
+    return np.arange(rows.size)
 
 
 @dataclass(frozen=True)

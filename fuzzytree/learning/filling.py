@@ -52,6 +52,13 @@ class FilledStatistics:
         """How many categories each column has, 0 for numbers."""
         return np.array([len(one) for one in self.categories], np.int64)
 
+    def without_last_column(self) -> FilledStatistics:
+        """Return the table without its last column."""
+        kept = range(len(self.categories) - 1)
+        return FilledStatistics(
+            self.statistics.of_columns(kept), self.stand_ins[:-1], self.categories[:-1]
+        )
+
 
 def filled(
     statistics: Statistics,

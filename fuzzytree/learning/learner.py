@@ -33,6 +33,12 @@ from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.units import FloatArray, IntArray, tallied
+from fuzzytree.learning.weights import (
+    MOST_COPIES,
+    RowWeights,
+    checked_weights,
+    row_weights,
+)
 from fuzzytree.model import FuzzyTree, text_fault
 
 Progress = Callable[[str, float], None]
@@ -60,6 +66,7 @@ def learn_arrays(
     name: str = "tree",
     settings: LearningSettings | None = None,
     categories: Mapping[str, tuple[str, ...]] | None = None,
+    weights: Sequence[float] | npt.NDArray[np.generic] | None = None,
     progress: Progress | None = None,
 ) -> Learnt:
     """Learn a fuzzy decision tree from a table of numbers.
@@ -75,6 +82,7 @@ def learn_arrays(
         name: Of the tree.
         settings: How to learn.
         categories: Of columns of text, by name; their values are positions.
+        weights: Of the rows (see `fuzzytree.learning.weights`); all 1 unless given.
         progress: Called with what is being done and its share done, 0 to 1.
 
     Raises:
@@ -96,7 +104,7 @@ def learn_arrays(
         settings=settings or LearningSettings(),
         categories=categories or {},
     )
-    learner.partial_fit(values, labels, progress=progress)
+    learner.partial_fit(values, labels, weights=weights, progress=progress)
     return learner.finish(progress=progress)
 
 
@@ -145,12 +153,14 @@ class ArrayLearner:
         values: npt.NDArray[np.generic],
         labels: Sequence[str] | npt.NDArray[np.generic],
         *,
+        weights: Sequence[float] | npt.NDArray[np.generic] | None = None,
         progress: Progress | None = None,
     ) -> None:
         """Take more rows; arguments as in `learn_arrays`.
 
         Raises:
-            ValueError: If shapes and labels do not fit.
+            ValueError: If shapes, labels and weights do not fit, or if weights that are
+                no whole numbers come in chunks or in paper mode.
             LearningError: If `missing` is `refuse` and a value is missing.
         """
         codes = _codes(labels, self.classes)
@@ -158,12 +168,23 @@ class ArrayLearner:
         _check_shape(values, codes, len(self.columns))
         if progress is not None:
             progress("counting", 0.0)
-        before = self.statistics.dropped
         if self.categories:
             values = codes_of_positions(
                 values.astype(np.float64), self.columns, self.categories
             )
-        self.statistics.update(values, codes)
+        found = None
+        if weights is not None:
+            found = row_weights(checked_weights(weights, len(values)))
+        self._refuse_shares(found)
+        before = self.statistics.dropped
+        if found is None:
+            self.statistics.update(values, codes)
+        else:
+            for rows in found.pieces():
+                piece = values[rows]
+                if found.shares is not None:
+                    piece = np.column_stack([piece, found.shares[rows]])
+                self.statistics.update(piece, codes[rows])
         dropped = self.statistics.dropped - before
         if dropped and self.settings.missing == "refuse":
             raise LearningError(
@@ -172,6 +193,31 @@ class ArrayLearner:
             )
         if progress is not None:
             progress("counting", 1.0)
+
+    def _refuse_shares(self, weights: RowWeights | None) -> None:
+        """Make room for weights that are no whole numbers, a column behind the others.
+
+        Raises:
+            ValueError: If they do not come with all rows at once, or in paper mode.
+        """
+        has_shares = weights is not None and weights.shares is not None
+        if has_shares and self.settings.mode == "paper":
+            raise ValueError(
+                "the paper's algorithm counts rows: its weights are whole numbers, and "
+                f"add up to {MOST_COPIES:,} at most"
+            )
+        if self._is_weighted or (has_shares and self.statistics.counts().any()):
+            raise ValueError(
+                "weights that are no whole numbers need all rows at once, not in chunks"
+            )
+        if has_shares:
+            self.statistics = Statistics(
+                len(self.classes), len(self.columns) + 1, self.settings.rows_per_class
+            )
+
+    @property
+    def _is_weighted(self) -> bool:
+        return self.statistics.features > len(self.columns)
 
     def finish(self, *, progress: Progress | None = None) -> Learnt:
         """Return the tree of all rows taken so far; more may follow.
@@ -201,7 +247,7 @@ class ArrayLearner:
         tree = with_probabilities(
             made.tree,
             sample,
-            ready.counts,
+            ready.weights,
             places,
             accuracy=grown.facts.get("inner_accuracy"),
         )
@@ -223,29 +269,48 @@ class ArrayLearner:
 
     def _prepared(self) -> _Ready:
         """Return what a tree is grown from."""
-        drops = self.settings.drops_missing
+        drops, width = self.settings.drops_missing, len(self.columns)
         check_rows(self.statistics, self.classes, self.statistics.dropped)
         if self.settings.mode == "paper":
             _refuse_texts(self.categories)
         categories = [self.categories.get(name, ()) for name in self.columns]
+        if self._is_weighted:
+            categories.append(())
         table = filled(self.statistics, categories, drops=drops)
         dropped = self.statistics.dropped
-        if dropped and not (drops or np.isfinite(table.stand_ins).any()):
+        if dropped and not (drops or np.isfinite(table.stand_ins[:width]).any()):
             raise LearningError(_INCOMPLETE.format(dropped))
         check_rows(table.statistics, self.classes, dropped)
-        sample = table.statistics.sample()
+        sample, shares = table.statistics.sample(), np.ones(1)
+        if self._is_weighted:
+            sample, shares = sample.without_last_column()
+            table = table.without_last_column()
         moments = table.statistics.moments(sample.units)
         _check_columns(moments)
         costs = np.array([self.settings.costs.get(c, 1.0) for c in self.columns])
         counts = moments.counts if drops else self.statistics.counts()
-        return _Ready(table, sample, moments, counts, costs)
+        kept = np.bincount(sample.codes, minlength=len(self.classes))
+        supports = (counts / np.maximum(kept, 1))[sample.codes] * shares
+        weights = supports * self._class_weights(sample, supports)[sample.codes]
+        return _Ready(table, sample, moments, supports, weights, costs)
+
+    def _class_weights(self, sample: Sample, weights: FloatArray) -> FloatArray:
+        """Return by what the weights of each class are multiplied."""
+        wanted = self.settings.class_weight
+        if wanted == "balanced":
+            totals = tallied(sample.codes, weights, len(self.classes))
+            shares = np.where(totals > 0, totals, np.inf) / totals.sum()
+            balanced: FloatArray = 1.0 / (np.count_nonzero(totals) * shares)
+            return balanced
+        return np.array([(wanted or {}).get(name, 1.0) for name in self.classes])
 
     def _rules(self, ready: _Ready) -> tuple[TrainingRows, SplitRules]:
         """Return the rows as the search for splits needs them, and its rules."""
         settings, sample = self.settings, ready.sample
         kept = np.bincount(sample.codes, minlength=len(self.classes))
-        weights = (ready.counts / np.maximum(kept, 1))[sample.codes]
-        rows = TrainingRows.of(sample, weights, len(self.classes), ready.table.sizes)
+        rows = TrainingRows.of(
+            sample, ready.weights, len(self.classes), ready.table.sizes
+        )
         rules = SplitRules(
             min_rows=settings.min_rows or min(_MIN_ROWS, int(kept[kept > 0].min())),
             columns=settings.columns or len(self.columns),
@@ -287,8 +352,7 @@ class ArrayLearner:
         rows, rules = self._rules(ready)
         choice = chosen_tree(rows, rules, self.settings, progress)
         found = finished_tree(choice.tree, rows, ready.sample, ready.moments)
-        weights = rows.weights * (ready.counts.sum() / rows.weights.sum())
-        supports = tallied(found.leaves, weights, len(found.sketch.leaves))
+        supports = tallied(found.leaves, ready.supports, len(found.sketch.leaves))
         facts: dict[str, Any] = {
             "chosen": {"splits": _STYLES[choice.style]},
             "inner_accuracy": choice.accuracy,
@@ -337,12 +401,22 @@ class ArrayLearner:
 
 @dataclass(frozen=True)
 class _Ready:
-    """A table without missing cells, its rows, moments, counts of classes and costs."""
+    """A table without missing cells, and what a tree is grown from.
+
+    Attributes:
+        table: The table.
+        sample: Its rows.
+        moments: Of the classes.
+        supports: How many rows of the table each row of the sample stands for.
+        weights: The same, times the weights of the classes.
+        costs: Of the columns.
+    """
 
     table: FilledStatistics
     sample: Sample
     moments: Moments
-    counts: IntArray
+    supports: FloatArray
+    weights: FloatArray
     costs: FloatArray
 
 
@@ -387,10 +461,11 @@ def _check_names(
     for name in settings.costs:
         if name not in columns:
             raise ValueError(f"costs: there is no column {name!r}")
-    if isinstance(settings.patterns_per_class, Mapping):
-        for name in settings.patterns_per_class:
+    for setting in ("patterns_per_class", "class_weight"):
+        by_class = getattr(settings, setting)
+        for name in by_class if isinstance(by_class, Mapping) else ():
             if name not in classes:
-                raise ValueError(f"patterns_per_class: there is no class {name!r}")
+                raise ValueError(f"{setting}: there is no class {name!r}")
 
 
 def _check_shape(values: npt.NDArray[np.generic], codes: IntArray, width: int) -> None:

@@ -45,7 +45,7 @@ _MOST_TO_FIT = 1 << 21
 def with_probabilities(
     tree: FuzzyTree,
     sample: Sample,
-    counts: IntArray,
+    weights: FloatArray,
     columns: dict[str, int],
     *,
     accuracy: float | None = None,
@@ -57,7 +57,7 @@ def with_probabilities(
     Args:
         tree: The tree.
         sample: Rows of the table, ordered by class.
-        counts: How many rows of the table each class has.
+        weights: How many rows of the table each row stands for, by its weight.
         columns: The position of each column in the rows.
         accuracy: The share of held-out rows about which trees were right, if known.
     """
@@ -65,11 +65,11 @@ def with_probabilities(
     if leaves > MOST_MIXED or leaves * classes > MOST_PROBABILITIES:
         return tree
     few = _thinned(sample, _MOST_TO_CHOOSE // leaves)
-    rows = _rated(tree, sample, few, counts, columns)
+    rows = _rated(tree, sample, few, weights, columns)
     sharpness, even = _chosen(rows, accuracy)
     many = _thinned(sample, _MOST_TO_FIT // leaves)
     if len(many) > len(few):
-        rows = _rated(tree, sample, many, counts, columns)
+        rows = _rated(tree, sample, many, weights, columns)
     vectors = _in_parts(_fitted(rows, sharpness, even).vectors)
     semantics = msgspec.structs.replace(tree.semantics, sharpness=sharpness)
     ends = tuple(
@@ -142,12 +142,13 @@ def _rated(
     tree: FuzzyTree,
     sample: Sample,
     places: IntArray,
-    counts: IntArray,
+    weights: FloatArray,
     columns: dict[str, int],
 ) -> _Rows:
     codes = sample.codes[places]
-    kept = np.bincount(codes, minlength=len(counts))
-    weights = counts[codes] / kept[codes]
+    if len(places) < len(sample.codes):
+        thinning = np.bincount(sample.codes) / np.maximum(np.bincount(codes), 1)
+        weights = weights[places] * thinning[codes]
     strengths = leaf_strengths(tree, sample.rows[places].T, columns)
     places_of = {name: code for code, name in enumerate(tree.classes)}
     owners = np.array([places_of[leaf.label] for leaf in tree.leaves], np.int64)

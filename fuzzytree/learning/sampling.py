@@ -55,6 +55,20 @@ class Sample:
             self.rows[chosen], self.moved[chosen], self.codes[chosen], self.units
         )
 
+    def without_last_column(self) -> tuple[Sample, FloatArray]:
+        """Return the sample without its last column, and that column, in its order."""
+        rows, moved = self.rows[:, :-1], self.moved[:, :-1]
+        keys = self.rows[:, -1], hashed_rows(rows), hashed_rows(moved), self.codes
+        order = np.lexsort(keys)
+        units = self.units
+        found = Sample(
+            np.ascontiguousarray(rows[order]),
+            np.ascontiguousarray(moved[order]),
+            self.codes[order],
+            ColumnUnits(units.origins[:-1], units.exponents[:-1], units.is_sound[:-1]),
+        )
+        return found, self.rows[order, -1]
+
 
 @dataclass(frozen=True)
 class _Rows:

@@ -40,6 +40,9 @@ class LearningSettings(
         costs: Cost of a feature by column name, 1 for those not named: among equally
             powerful features the cheaper one is chosen, and what a further feature
             gains a combination is divided by it.
+        class_weight: By what the weights of a class' rows are multiplied, by its name
+            and 1 for those not named; or `balanced`, for all classes to weigh the same.
+            Supports of leaves stay those of the rows.
         rows_per_class: How many rows of a class are kept at most; none is left out
             where no more are distinct and there are no more.
         seed: Moves the folds of held-out rows.
@@ -67,6 +70,7 @@ class LearningSettings(
     points: int = 3
     separate_sides: bool = False
     costs: Mapping[str, float] = {}
+    class_weight: Mapping[str, float] | Literal["balanced"] | None = None
     rows_per_class: int = 5_000
     seed: int = 0
     missing: Literal["learn", "drop", "refuse"] = "learn"
@@ -117,6 +121,14 @@ class LearningSettings(
             of = f" of class {name!r}" if name else ""
             text = f"patterns_per_class{of} is at least 1, not {number!r}"
             claims.append((number >= 1, text))
+        of_class = self.class_weight
+        if isinstance(of_class, str):
+            text = f"class_weight is 'balanced' or a weight by class, not {of_class!r}"
+            claims.append((of_class == "balanced", text))
+        else:
+            for name, weight in (of_class or {}).items():
+                text = f"the weight of class {name!r} is finite and above 0"
+                claims.append((0 < weight < math.inf, f"{text}, not {weight!r}"))
         for name, cost in self.costs.items():
             text = f"the cost of {name!r} is finite and at least 0, not {cost!r}"
             claims.append((0 <= cost < math.inf, text))
@@ -129,7 +141,7 @@ class LearningSettings(
 
 
 _OF_MODE = {
-    "default": ("columns", "leaves", "min_rows", "depth"),
+    "default": ("columns", "leaves", "min_rows", "depth", "class_weight"),
     "paper": ("alpha", "l_max", "patterns_per_class", "keep_reversals"),
 }
 """Settings that one mode alone has."""
