@@ -12,9 +12,16 @@ import numpy.typing as npt
 
 from fuzzytree.cells import numbers_only
 from fuzzytree.errors import MissingExtraError, install_hint
-from fuzzytree.learning import ArrayLearner, LearningReport, LearningSettings
+from fuzzytree.learning import (
+    ArrayLearner,
+    LearningReport,
+    LearningSettings,
+    checked_weights,
+    importances,
+)
 from fuzzytree.model import (
     DATE_UNIT,
+    PARTS,
     FuzzyTree,
     Variable,
     label_type_of,
@@ -25,9 +32,17 @@ from fuzzytree.semantics import Status, rules_from_tree
 from fuzzytree.tables import batches, read_table
 
 try:
+    from scipy.sparse import csr_array
     from sklearn.base import BaseEstimator, ClassifierMixin
+    from sklearn.utils import (
+        _safe_indexing,  # pyright: ignore[reportPrivateUsage]  # in its reference
+    )
     from sklearn.utils.multiclass import check_classification_targets
-    from sklearn.utils.validation import check_is_fitted, validate_data
+    from sklearn.utils.validation import (
+        _num_samples,  # pyright: ignore[reportPrivateUsage]  # rows of any container
+        check_is_fitted,
+        validate_data,
+    )
 except ImportError as error:
     raise MissingExtraError(
         f"FuzzyTreeClassifier needs {install_hint('sklearn')}"
@@ -39,6 +54,9 @@ if TYPE_CHECKING:
 LabelArray = npt.NDArray[np.generic]
 Mode = Literal["default", "paper"]
 PatternsPerClass = int | Mapping[str, int] | None
+ClassWeight = Mapping[Any, float] | Literal["balanced"] | None
+
+_LEAST_PROBABILITY = 0.5 / PARTS  # half the smallest one that a leaf can have
 
 
 def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
@@ -107,9 +125,10 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     Class k of the tree is named `str(classes_[k])`; its columns are those of the
     table it was fitted on, or `x1`, `x2`, ... Frames may have columns of text,
     categories, truth values and dates. Missing values are learnt from and answered;
-    paper mode refuses them. Sample weights are not supported. A pickle or a copy of a
-    fitted classifier holds its tree, with the range of each column and the centre of
-    each combination, and no training rows.
+    paper mode refuses them. Rows and classes may have weights; paper mode counts rows,
+    so it takes whole weights of rows alone. A pickle or a copy of a fitted classifier
+    holds its tree, with the range of each column and the centre of each combination,
+    and no training rows.
 
     Args:
         mode: `default`, or `paper` for the paper's algorithm to the letter.
@@ -128,6 +147,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         shrinkage: How far the off-diagonal of a scatter is shrunk, in [0, 1).
         entry: How much one more column must help a combination.
         costs: The cost of a column, by its name in the tree; 1 unless given.
+        class_weight: By what the weights of a class' rows are multiplied: a number by
+            label, 1 for labels that are not named; or `balanced`, for all classes to
+            weigh the same.
         seed: Moves the folds of held-out rows. The same seed and table give the
             same tree. `fuzzytree.learning.LearningSettings` says more about each.
 
@@ -137,6 +159,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         classes_: The labels, sorted.
         n_features_in_: The number of columns seen in `fit`.
         feature_names_in_: Their names, if the table had any.
+        feature_importances_: The share of each column in what the nodes learn about
+            the classes, shape (n_features_in_,); see
+            `fuzzytree.learning.importance`.
 
     Example:
         >>> import numpy as np
@@ -148,6 +173,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     mode: Mode
     patterns_per_class: PatternsPerClass
+    class_weight: ClassWeight
     tree_: FuzzyTree
     report_: LearningReport
     classes_: LabelArray
@@ -172,6 +198,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         shrinkage: float = 1e-3,
         entry: float = 2.0,
         costs: Mapping[str, float] | None = None,
+        class_weight: ClassWeight = None,
         seed: int = 0,
     ) -> None:
         self.mode = mode
@@ -187,31 +214,58 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         self.shrinkage = shrinkage
         self.entry = entry
         self.costs = costs
+        self.class_weight = class_weight
         self.seed = seed
 
-    def fit(self, X: npt.ArrayLike, y: npt.ArrayLike) -> Self:
+    def fit(
+        self,
+        X: npt.ArrayLike,
+        y: npt.ArrayLike,
+        sample_weight: npt.ArrayLike | None = None,
+    ) -> Self:
         """Learn a tree.
+
+        A row of the weight 3 counts as three equal rows, one of the weight 0 is left
+        out. Of weights that are no whole numbers only the ratios matter.
 
         Args:
             X: Finite numbers, shape (rows, columns).
             y: A label for each row; at least two different ones.
+            sample_weight: A weight for each row, finite and not negative; all 1 unless
+                given.
 
         Returns:
             The classifier itself.
 
         Raises:
-            ValueError: If the table has one row, one class or no varying column, or
-                a setting is out of its range.
+            ValueError: If the table has one row, one class or no varying column, if a
+                setting is out of its range, or if a weight is negative, missing or
+                infinite, or all are 0.
+
+        Example:
+            >>> import numpy as np
+            >>> values, labels = np.array([[1.0], [2.0], [7.0], [8.0]]), [0, 0, 1, 1]
+            >>> model = FuzzyTreeClassifier()
+            >>> model.fit(values, labels, sample_weight=[1, 1, 3, 1]).tree_.leaves[1]
+            Leaf(label='1', pattern='1', support=4, probabilities=(0.166666, 0.833334))
         """
-        table, categories, dates = _as_numbers(X)
+        rows: Any = X, y
+        weights = None
+        if sample_weight is not None:
+            weights = checked_weights(np.asarray(sample_weight), _num_samples(X))
+            if not weights.all():
+                kept = np.flatnonzero(weights)
+                rows = [_safe_indexing(part, kept) for part in rows]
+                weights = weights[kept]
+        table, categories, dates = _as_numbers(rows[0])
         values, labels = _validated(
-            self, table, y, dtype=np.float64, ensure_all_finite=self._finite()
+            self, table, rows[1], dtype=np.float64, ensure_all_finite=self._finite()
         )
         check_classification_targets(labels)
         if len(values) == 1:
             raise ValueError("cannot learn from one sample (n_samples = 1)")
         self._start(np.unique(labels), categories, dates)
-        return self._learn(values, labels)
+        return self._learn(values, labels, weights)
 
     def partial_fit(
         self, X: npt.ArrayLike, y: npt.ArrayLike, classes: npt.ArrayLike | None = None
@@ -266,9 +320,10 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return True if self.mode == "paper" else "allow-nan"
 
     def __sklearn_tags__(self) -> Any:
-        """Say that missing values are learnt from, but in paper mode."""
+        """Say that missing values and categories are learnt from, but in paper mode."""
         tags: Any = super().__sklearn_tags__()
         tags.input_tags.allow_nan = self.mode != "paper"
+        tags.input_tags.categorical = self.mode != "paper"
         return tags
 
     def _start(
@@ -287,8 +342,11 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             categories=categories or {},
         )
 
-    def _learn(self, values: FloatArray, labels: LabelArray) -> Self:
-        self._learner.partial_fit(values, np.searchsorted(self.classes_, labels))
+    def _learn(
+        self, values: FloatArray, labels: LabelArray, weights: FloatArray | None = None
+    ) -> Self:
+        codes = np.searchsorted(self.classes_, labels)
+        self._learner.partial_fit(values, codes, weights=weights)
         learnt = self._learner.finish()
         self.tree_ = with_label_type(learnt.tree, label_type_of(self.classes_.tolist()))
         self.report_ = learnt.report
@@ -340,6 +398,93 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         assert mixed is not None  # the tree has a sharpness
         return np.ascontiguousarray(mixed.T)
 
+    def predict_log_proba(self, X: npt.ArrayLike) -> FloatArray:
+        """Return the logarithm of the probability of each class; -inf for none.
+
+        Returns:
+            Shape (rows, classes), as `predict_proba`.
+
+        Raises:
+            ValueError: As `predict_proba`.
+        """
+        with np.errstate(divide="ignore"):
+            found: FloatArray = np.log(self.predict_proba(X))
+        return found
+
+    def decision_function(self, X: npt.ArrayLike) -> FloatArray:
+        """Return how much speaks for each class: logarithms of its probability.
+
+        A probability below half a millionth counts as that, so all are finite. The
+        largest belongs to the class of `predict`.
+
+        Returns:
+            Of two classes the logarithm of the odds of the second one, shape (rows,),
+            above 0 where it is predicted; else shape (rows, classes).
+
+        Raises:
+            ValueError: As `predict_proba`.
+
+        Example:
+            >>> import numpy as np
+            >>> values, labels = np.array([[1.0], [2.0], [7.0], [8.0]]), [0, 0, 1, 1]
+            >>> model = FuzzyTreeClassifier().fit(values, labels)
+            >>> model.decision_function([[1.0], [8.0]]).round(2).tolist()
+            [-1.1, 1.1]
+        """
+        found = np.log(np.maximum(self.predict_proba(X), _LEAST_PROBABILITY))
+        odds: FloatArray = found[:, 1] - found[:, 0] if found.shape[1] == 2 else found
+        return odds
+
+    @property
+    def feature_importances_(self) -> FloatArray:
+        """The share of each column in what the nodes learn about the classes."""
+        check_is_fitted(self)
+        shares = importances(self.tree_)
+        return np.array([shares[name] for name in self._columns()])
+
+    def get_depth(self) -> int:
+        """Return how many conditions lead to the deepest leaf."""
+        check_is_fitted(self)
+        return max(map(len, _paths(self.tree_)))
+
+    def get_n_leaves(self) -> int:
+        """Return how many leaves the tree has."""
+        check_is_fitted(self)
+        return len(self.tree_.leaves)
+
+    def decision_path(self, X: npt.ArrayLike) -> csr_array:
+        """Return which nodes and which leaf each row passes.
+
+        Returns:
+            A sparse indicator of shape (rows, nodes + leaves): first the nodes in the
+            order of `tree_.nodes`, then the leaves; leaf k of `apply` is column
+            `len(tree_.nodes) + k - 1`.
+
+        Raises:
+            ValueError: As `predict`.
+
+        Example:
+            >>> import numpy as np
+            >>> values, labels = np.array([[1.0], [2.0], [7.0], [8.0]]), [0, 0, 1, 1]
+            >>> model = FuzzyTreeClassifier().fit(values, labels)
+            >>> model.decision_path([[1.0], [8.0]]).toarray().tolist()
+            [[1, 1, 0], [1, 0, 1]]
+        """
+        leaves = self.apply(X) - 1
+        paths = _paths(self.tree_)
+        nodes, size = len(self.tree_.nodes), len(paths)
+        ways = csr_array(
+            (
+                np.ones(sum(map(len, paths)) + size, np.int64),
+                np.array(
+                    [k for end, path in enumerate(paths) for k in (*path, nodes + end)]
+                ),
+                np.cumsum([0, *(len(path) + 1 for path in paths)]),
+            ),
+            shape=(size, nodes + size),
+        )
+        return ways[leaves]
+
     def __fuzzytree__(self) -> FuzzyTree:
         """Return the tree, so that every function of fuzzytree takes the classifier.
 
@@ -376,6 +521,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             shrinkage=self.shrinkage,
             entry=self.entry,
             costs=self.costs or {},
+            class_weight=_by_name(self.class_weight),
             seed=self.seed,
         )
 
@@ -408,6 +554,27 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _class_of_rule(self) -> IntArray:
         number = {name: k for k, name in enumerate(self.tree_.classes)}
         return np.array([number[leaf.label] for leaf in self.tree_.leaves], np.int64)
+
+
+def _by_name(weights: ClassWeight) -> Mapping[str, float] | Literal["balanced"] | None:
+    """Return weights of classes by their names in the tree."""
+    if isinstance(weights, Mapping):
+        return {str(label): float(weight) for label, weight in weights.items()}
+    return weights
+
+
+def _paths(tree: FuzzyTree) -> list[tuple[int, ...]]:
+    """Return the positions of the nodes that lead to each leaf, from the root on."""
+    found: list[tuple[int, ...]] = [()] * len(tree.leaves)
+    above: list[tuple[int, ...]] = [()] * len(tree.nodes)
+    for number, node in enumerate(tree.nodes):  # parents stand before children
+        path = (*above[number], number)
+        for branch in node.branches:
+            if branch.node is not None:
+                above[branch.node - 1] = path
+            else:
+                found[(branch.leaf or 1) - 1] = path
+    return found
 
 
 def _prepared(tree: FuzzyTree) -> Callable[[ModelKind], Run]:

@@ -15,9 +15,12 @@ import msgspec
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.testing import assert_allclose
+from sklearn import config_context
 from sklearn.base import clone
 from sklearn.datasets import load_iris, load_wine
-from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.metrics import accuracy_score, make_scorer
+from sklearn.model_selection import GridSearchCV, cross_val_score, cross_validate
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
@@ -37,8 +40,17 @@ IRIS, SPECIES = load_iris(return_X_y=True)
 WINE = load_wine(as_frame=True)
 
 
+def refused_in_paper_mode(estimator: Any) -> dict[str, str]:
+    """Return the checks of what the paper does not have."""
+    text = "the paper's algorithm has no weights of classes"
+    return {"check_class_weight_classifiers": text} if estimator.mode == "paper" else {}
+
+
 @pytest.mark.heavy
-@parametrize_with_checks([FuzzyTreeClassifier(), FuzzyTreeClassifier(mode="paper")])  # type: ignore[untyped-decorator]
+@parametrize_with_checks(  # type: ignore[untyped-decorator]
+    [FuzzyTreeClassifier(), FuzzyTreeClassifier(mode="paper")],
+    expected_failed_checks=refused_in_paper_mode,
+)
 def test_scikit_learn_finds_nothing_wrong(estimator: Any, check: Any) -> None:
     check(estimator)
 
@@ -246,6 +258,136 @@ def test_a_frame_may_have_texts_dates_and_missing_values() -> None:
     assert ft.run(model.tree_, table).classes == found
     table["island"] = "Mars"
     assert len(model.predict(table)) == rows
+
+
+def test_a_weight_counts_as_so_many_equal_rows_of_a_frame() -> None:
+    rng = np.random.default_rng(0)
+    table = pd.DataFrame(
+        {"place": [*"abcd"] * 20, "size": rng.normal(size=80)}, index=range(9, 89)
+    )
+    labels = np.where(table["place"].isin(["a", "b"]), "in", "out")
+    weights = pd.Series(rng.integers(0, 3, 80))
+    weights[3::4] = 0  # no d
+    order = np.repeat(np.arange(80), weights)
+    one = FuzzyTreeClassifier().fit(table, labels, sample_weight=weights)
+    other = FuzzyTreeClassifier().fit(table.iloc[order], labels[order])
+    assert one.tree_ == other.tree_
+    assert one.tree_.variables[0].categories == ("a", "b", "c")
+
+
+def test_labels_of_rows_without_weight_are_no_classes() -> None:
+    weights = (SPECIES < 2).astype(float)
+    model = FuzzyTreeClassifier().fit(IRIS, SPECIES, sample_weight=weights)
+    assert model.classes_.tolist() == [0, 1]
+    assert model.tree_ == FuzzyTreeClassifier().fit(IRIS[:100], SPECIES[:100]).tree_
+
+
+def test_weights_of_classes_are_given_by_label() -> None:
+    rare = np.flatnonzero((SPECIES == 1) | (np.arange(150) % 5 == 0))
+    values, labels = IRIS[rare][:, :2], SPECIES[rare] == 1
+    plain, *heavy = (
+        FuzzyTreeClassifier(class_weight=wanted).fit(values, labels)
+        for wanted in (None, {False: 50.0}, {False: 50.0, True: 1})
+    )
+    assert heavy[0].tree_ == heavy[1].tree_
+    assert heavy[0].predict(values).sum() < plain.predict(values).sum()
+    with pytest.raises(ValueError, match="no class"):
+        FuzzyTreeClassifier(class_weight={7: 1.0}).fit(values, labels)
+
+
+def test_weights_are_routed_through_pipelines_and_searches() -> None:
+    weights = np.where(SPECIES == 2, 0.0, 1.0)
+    alone = np.flatnonzero(weights)
+    with config_context(enable_metadata_routing=True):
+        model = FuzzyTreeClassifier().set_fit_request(sample_weight=True)
+        scaler = StandardScaler().set_fit_request(sample_weight=False)
+        scorer = make_scorer(accuracy_score).set_score_request(sample_weight=True)
+        pipeline = make_pipeline(scaler, model).fit(
+            IRIS, SPECIES, sample_weight=weights
+        )
+        search = GridSearchCV(model, {"columns": [1, 2]}, cv=3, scoring=scorer).fit(
+            IRIS, SPECIES, sample_weight=weights
+        )
+        tested = cross_validate(
+            model,
+            IRIS,
+            SPECIES,
+            cv=3,
+            scoring=scorer,
+            params={"sample_weight": weights},
+        )
+    assert set(pipeline.predict(IRIS)) == {0, 1}
+    assert set(search.predict(IRIS)) == {0, 1}
+    assert (search.predict(IRIS[alone]) == SPECIES[alone]).all()
+    assert tested["test_score"].min() > 0.95
+
+
+@pytest.mark.parametrize("kept", [150, 100], ids=["three classes", "two classes"])
+def test_the_decision_function_is_the_logarithm_of_the_probabilities(
+    kept: int,
+) -> None:
+    values, labels = IRIS[:kept], SPECIES[:kept]
+    model = FuzzyTreeClassifier().fit(values, labels)
+    shares, found = model.predict_proba(values), model.decision_function(values)
+    assert np.isfinite(found).all()
+    if kept == 150:
+        assert found.shape == (150, 3)
+        assert (found.argmax(axis=1) == model.predict(values)).all()
+        assert_allclose(np.exp(found), shares, atol=1e-6)
+    else:
+        assert found.shape == (100,)
+        assert ((found > 0) == (model.predict(values) == 1)).all()
+        assert_allclose(1 / (1 + np.exp(-found)), shares[:, 1], atol=1e-6)
+    with np.errstate(divide="ignore"):
+        assert (model.predict_log_proba(values) == np.log(shares)).all()
+
+
+def test_paths_lead_through_nodes_to_the_leaf_that_answers() -> None:
+    model = FuzzyTreeClassifier().fit(WINE.data, WINE.target)
+    tree, found = model.tree_, model.decision_path(WINE.data)
+    leaves = model.apply(WINE.data)
+    nodes = len(tree.nodes)
+    assert found.format == "csr"
+    assert found.shape == (178, nodes + model.get_n_leaves())
+    assert model.get_n_leaves() == len(tree.leaves)
+    assert set(found.data) == {1}
+    assert (found[np.arange(178), nodes + leaves - 1] == 1).all()
+    assert (found[:, [0]].toarray() == 1).all()
+    assert found.sum(axis=1).max() - 1 == model.get_depth()
+    support = found[:, nodes:].sum(axis=0)
+    assert support.tolist() == [leaf.support for leaf in tree.leaves]
+
+
+def test_importances_are_those_of_the_columns_that_decide() -> None:
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=(400, 4))
+    labels = np.where(values[:, 2] > 0, "up", np.where(values[:, 0] > 1, "up", "down"))
+    model = FuzzyTreeClassifier(columns=1).fit(values, labels)
+    found = model.feature_importances_
+    assert found.shape == (4,)
+    assert abs(found.sum() - 1.0) < 1e-12
+    assert found[2] > found[0] > 0.05
+    assert found[[1, 3]].max() < 0.05
+    labels = values[:, 0] + 2 * values[:, 1] > 0
+    found = FuzzyTreeClassifier(leaves=2).fit(values, labels).feature_importances_
+    assert 0.25 < found[0] < 0.4
+    loaded = pickle.loads(pickle.dumps(model))
+    assert (loaded.feature_importances_ == model.feature_importances_).all()
+
+
+def test_a_pickle_is_as_small_as_the_model() -> None:
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=(100_000, 5))
+    labels = (values[:, 0] > 0.3) ^ (values[:, 1] > 0.1)
+    model = FuzzyTreeClassifier(leaves=8).fit(values, labels)
+    size = len(pickle.dumps(model))
+    assert size < 2 * len(msgspec.json.encode(model.tree_)) + 4096
+    assert size < 20_000  # of 4,000,000 bytes of rows
+
+
+def test_a_fitted_classifier_is_drawn() -> None:
+    model = FuzzyTreeClassifier().fit(WINE.data, WINE.target)
+    assert ft.draw(model).svg == ft.draw(model.tree_).svg
 
 
 def test_without_scikit_learn_the_classifier_says_what_installs_it(

@@ -1,6 +1,7 @@
 from .findings import LearningReport as LearningReport
 from .findings import remarks as remarks
 from .front import Front as Front
+from .importance import importances as importances
 from .learner import ArrayLearner as ArrayLearner
 from .learner import Learnt as Learnt
 from .learner import learn_arrays as learn_arrays
@@ -13,3 +14,4 @@ from .parts import read_or_collect as read_or_collect
 from .parts import refuse_repeated as refuse_repeated
 from .parts import state_content as state_content
 from .settings import LearningSettings as LearningSettings
+from .weights import checked_weights as checked_weights

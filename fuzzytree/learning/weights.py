@@ -69,7 +69,7 @@ def checked_weights(
             "and not negative"
         )
     if not values.any():
-        raise ValueError("all weights are 0, and a row of weight 0 is left out")
+        raise ValueError("all weights are zero, and a row of weight zero is left out")
     return values
 
 

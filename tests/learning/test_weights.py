@@ -138,7 +138,7 @@ def test_classes_weigh_the_same_if_balanced() -> None:
             [1.0, 1.0, np.nan, 1.0],
             "the weight of row 3 is nan; a weight is finite and not negative",
         ),
-        ([0] * 4, "all weights are 0, and a row of weight 0 is left out"),
+        ([0] * 4, "all weights are zero, and a row of weight zero is left out"),
         (["a"] * 4, "weights are numbers, one for each row"),
         ([1, 1, 0, 0], "cannot learn from one class: every row is 'c0'"),
     ],
