@@ -25,6 +25,9 @@ MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 REAL = frozenset("biuf")
 """Numpy's letters for truth values, integers and floats."""
 
+NO_WEIGHT = "all weights are zero, and a row of weight zero is left out"
+"""Why there is nothing to learn from."""
+
 _NUMBERS = (bool, int, float, np.bool_, np.integer, np.floating)
 _NO_NUMBER = frozenset("cmMSV")  # complex, times, bytes
 _NUMBER = re.compile(
@@ -52,6 +55,40 @@ def unmasked(array: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
     filled = np.ma.getdata(array).astype(np.float64 if is_real else object)
     filled[np.ma.getmaskarray(array)] = math.nan if is_real else None
     return filled
+
+
+def is_weight(values: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Return which numbers may be the weight of a row: finite and not negative ones."""
+    return np.isfinite(values) & (values >= 0)
+
+
+def checked_weights(
+    weights: Sequence[float] | npt.NDArray[np.generic], rows: int
+) -> npt.NDArray[np.float64]:
+    """Return the weights of some rows as numbers.
+
+    Raises:
+        ValueError: If there are more or fewer, one is negative, missing or infinite, or
+            all are 0.
+    """
+    found = unmasked(np.asanyarray(weights))
+    if found.dtype.kind not in REAL:
+        raise ValueError("weights are numbers, one for each row")
+    if found.ndim != 1:
+        shape = tuple(found.shape)
+        raise ValueError(f"weights have the shape {shape}, and they need (rows,)")
+    if len(found) != rows:
+        raise ValueError(f"{len(found)} weights, but {rows} rows")
+    values = found.astype(np.float64)
+    bad = np.flatnonzero(~is_weight(values))
+    if len(bad):
+        raise ValueError(
+            f"the weight of row {bad[0] + 1} is {values[bad[0]]:g}; a weight is finite "
+            "and not negative"
+        )
+    if not values.any():
+        raise ValueError(NO_WEIGHT)
+    return values
 
 
 def is_missing(value: object) -> bool:

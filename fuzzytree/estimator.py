@@ -10,13 +10,12 @@ import narwhals as nw
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.cells import numbers_only
+from fuzzytree.cells import checked_weights, numbers_only
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import (
     ArrayLearner,
     LearningReport,
     LearningSettings,
-    checked_weights,
     importances,
 )
 from fuzzytree.model import (

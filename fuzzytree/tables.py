@@ -44,9 +44,12 @@ import numpy.typing as npt
 
 from fuzzytree.cells import (
     MISSING,
+    NO_WEIGHT,
     REAL,
+    checked_weights,
     distinct_values,
     is_missing,
+    is_weight,
     number_of,
     numbers_only,
     plain,
@@ -80,6 +83,8 @@ if TYPE_CHECKING:
     from fuzzytree.cells import Cells
 
 FloatArray = npt.NDArray[np.float64]
+Weights: TypeAlias = str | Sequence[float] | npt.NDArray[np.generic] | None
+"""A column of weights, the weights of all rows, or None where all are 1."""
 IntArray = npt.NDArray[np.int64]
 Only = frozenset[str] | None
 S = TypeVar("S")
@@ -164,6 +169,8 @@ class Table(msgspec.Struct, frozen=True, eq=False):
         remarks: Columns, and what they have and is left out.
         label_type: What the names of classes stand for, if not text.
         weights: How many rows each row of a sample stands for; None of a whole table.
+        row_weights: The weight of each row, above 0; None where rows have none.
+        weightless: How many rows were left out because their weight is 0.
         categories: Of columns of text or truth values, by name; their values are
             positions among these.
         dates: The columns of dates; their values are days since 1970-01-01 (UTC).
@@ -180,6 +187,8 @@ class Table(msgspec.Struct, frozen=True, eq=False):
     remarks: tuple[tuple[str, str], ...] = ()
     label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
     weights: FloatArray | None = None
+    row_weights: FloatArray | None = None
+    weightless: int = 0
     categories: Mapping[str, tuple[str, ...]] = {}
     dates: tuple[str, ...] = ()
 
@@ -257,6 +266,7 @@ def read_table(
     source: object,
     *,
     target: str | Sequence[object] | npt.NDArray[np.generic],
+    weights: Weights = None,
     ignore: Sequence[str] = (),
     name: str | None = None,
 ) -> Table:
@@ -269,10 +279,14 @@ def read_table(
     Args:
         source: The table; see the module.
         target: The column of the classes, or the classes themselves.
+        weights: The column of the rows' weights, which is no input then, or the weights
+            themselves; all 1 if None.
         ignore: Columns to leave out.
         name: What messages call the table; its path unless given.
 
     Raises:
+        ValueError: If weights that are no column are not one number for each row, or
+            cannot be weights.
         TableError: If a column is absent, stands twice or holds cells of several kinds,
             if there is no row, or if rows have different lengths; all such columns are
             named.
@@ -283,7 +297,9 @@ def read_table(
         >>> table.columns, table.values.tolist(), table.classes, table.codes.tolist()
         (('x1',), [[1.5, 2.5]], ('firm', 'soft'), [1, 0])
     """
-    rows = LearningRows(source, target=target, ignore=ignore, name=name)
+    rows = LearningRows(
+        source, target=target, weights=weights, ignore=ignore, name=name
+    )
     return rows.table([*rows])
 
 
@@ -296,12 +312,14 @@ class LearningPiece(msgspec.Struct, frozen=True, eq=False):
         values: The codes of those that have a class (see `fuzzytree.columns`), of
             shape (columns, rows).
         codes: The number of the class of each.
+        weights: Their weights; None where rows have none.
     """
 
     name: str
     rows: int
     values: FloatArray
     codes: IntArray
+    weights: FloatArray | None = None
 
 
 class LearningRows:
@@ -321,6 +339,7 @@ class LearningRows:
         labels: The classes.
         rows: How many rows were read.
         unlabelled: How many of them were left out because they have no class.
+        weightless: How many of the others were left out because their weight is 0.
         missing: How many cells of the others are missing.
         remarks: Columns, and what they have and is left out.
         contents: What the cells of each column hold.
@@ -334,6 +353,7 @@ class LearningRows:
         source: object,
         *,
         target: str | Sequence[object] | npt.NDArray[np.generic],
+        weights: Weights = None,
         ignore: Sequence[str] = (),
         name: str | None = None,
         chosen: Sequence[str] | None = None,
@@ -352,7 +372,11 @@ class LearningRows:
         self._chosen_by = chosen_by
         self.labels = labels or ClassLabels()
         self.name = name or path_of(source) or ""
-        self.rows = self.unlabelled = self.missing = 0
+        self.rows = self.unlabelled = self.weightless = self.missing = 0
+        self._weight = weights.strip() if isinstance(weights, str) else None
+        self._weights: FloatArray | None = None
+        if weights is not None and not isinstance(weights, str):
+            self._weights = checked_weights(weights, np.size(weights))
         self.remarks: list[tuple[str, str]] = []
         self._ignore = [column.strip() for column in as_names(ignore)]
         self._codes: IntArray | None = None
@@ -383,15 +407,22 @@ class LearningRows:
 
         def read(
             piece: TablePiece,
-        ) -> tuple[TablePiece, FloatArray, list[_Column], _Coded | None]:
+        ) -> tuple[
+            TablePiece, FloatArray, list[_Column], FloatArray | None, _Coded | None
+        ]:
             numbers = _codes_of(piece, chosen, names, self.categorical)
+            weights = (
+                None if self._weight is None else _row_weights(piece, self._weight)
+            )
             if self._codes is not None:
-                return piece, *numbers, None
+                return piece, *numbers, weights, None
             cells = piece.cells[piece.columns.index(self.target)]
-            return piece, *numbers, coded_classes(cells)
+            return piece, *numbers, weights, coded_classes(cells)
 
         later = in_order(read, self._pieces)
-        for piece, values, columns, labels in itertools.chain([read(first)], later):
+        for piece, values, columns, weights, labels in itertools.chain(
+            [read(first)], later
+        ):
             for name, (contents, examples) in zip(names, columns, strict=True):
                 known = self.contents.setdefault(name, Contents())
                 self.contents[name] = known.merge(contents)
@@ -402,21 +433,28 @@ class LearningRows:
                 codes = self.labels.add(*labels)
             else:
                 codes = cast("IntArray", self._codes)[self.rows :][: piece.rows]
+            if self._weights is not None:
+                weights = self._weights[self.rows :][: piece.rows]
             for row in np.flatnonzero(~is_kept).tolist():
                 self._count(chosen[row], values[row])
             self.rows += piece.rows
             if self._progress is not None:
                 self._progress(f"{piece.name}: {rate_text(self.rows, begin)}", 0.0)
-            if len(codes) != piece.rows:
+            sizes = {piece.rows, len(codes)}
+            if len(sizes if weights is None else sizes | {len(weights)}) > 1:
                 continue
-            has_class = codes >= 0
+            is_used = codes >= 0
+            self.unlabelled += piece.rows - int(np.count_nonzero(is_used))
             if not is_kept.all():
                 values = values[is_kept]
-            if not has_class.all():
-                values, codes = values[:, has_class], codes[has_class]
-            self.unlabelled += piece.rows - len(codes)
+            if weights is not None:
+                self.weightless += int(np.count_nonzero(is_used & (weights == 0)))
+                is_used &= weights > 0
+                weights = weights[is_used]
+            if not is_used.all():
+                values, codes = values[:, is_used], codes[is_used]
             self.missing += sum(int(is_missing_code(row).sum()) for row in values)
-            yield LearningPiece(piece.name, piece.rows, values, codes)
+            yield LearningPiece(piece.name, piece.rows, values, codes, weights)
 
     def refuse_empty(self) -> None:
         """Check what all rows show.
@@ -432,6 +470,11 @@ class LearningRows:
                 f"{self.name} has {self.rows} rows, and there are "
                 f"{len(self._codes)} classes for them"
             )
+        if self._weights is not None and len(self._weights) != self.rows:
+            raise TableError(
+                f"{self.name} has {self.rows} rows, and there are "
+                f"{len(self._weights)} weights for them"
+            )
         for column, starts in self._counts.items():
             if not starts:
                 raise TableError(
@@ -442,6 +485,8 @@ class LearningRows:
             raise TableError(f"{self.name} has no column to learn from")
         if self.unlabelled == self.rows:
             raise TableError(f"{self.name} has no row with a class")
+        if self.unlabelled + self.weightless == self.rows:
+            raise TableError(f"{self.name}: {NO_WEIGHT}")
 
     def table(self, parts: Sequence[LearningPiece]) -> Table:
         """Return all pieces as one table.
@@ -462,17 +507,25 @@ class LearningRows:
             self.first,
         )
         places, classes = self.labels.ordered()
+        codes, weights = places[codes], None
+        heavy = [part.weights for part in parts if part.weights is not None]
+        if heavy:
+            weights = np.concatenate(heavy)
+            present, codes = np.unique(codes, return_inverse=True)
+            classes = tuple(classes[code] for code in present.tolist())
         return Table(
             self.name,
             columns.names,
             columns.placed(values),
             classes,
-            places[codes],
+            codes,
             self.missing,
             self.unlabelled,
             self.target,
             (*self.remarks, *columns.remarks),
             self.labels.label_type() if self.target else self.labels.kind(),
+            row_weights=weights,
+            weightless=self.weightless,
             categories=columns.categories,
             dates=columns.dates,
         )
@@ -488,8 +541,9 @@ class LearningRows:
             _refuse_absent(first, [self.target], "")
             _refuse_absent(first, self.names, f", which {self._chosen_by}")
             return [first.columns.index(column) for column in self.names]
-        target = [self.target] if self._codes is None else []
-        chosen = _learnt_columns(first, [*target, *self._ignore])
+        others = [self.target] if self._codes is None else []
+        others += [] if self._weight is None else [self._weight]
+        chosen = _learnt_columns(first, [*others, *self._ignore])
         unnamed = [k for k in chosen if not first.written[k].strip()]
         self._counts = dict.fromkeys(unnamed, frozenset({0, 1}))
         self.names = tuple(first.columns[k] for k in chosen if k not in unnamed)
@@ -1039,6 +1093,25 @@ def _numbers(cells: Cells) -> tuple[FloatArray, list[int]]:
     bad = [row for row, value in enumerate(result) if value is None]
     filled = [math.nan if value is None else value for value in result]
     return np.array(filled, np.float64), bad
+
+
+def _row_weights(piece: TablePiece, column: str) -> FloatArray:
+    """Return the weights of some rows.
+
+    Raises:
+        TableError: If one is no number, negative, missing or infinite.
+    """
+    cells = piece.cells[piece.columns.index(column)]
+    values, faults = _numbers(cells)
+    is_bad = ~is_weight(values)
+    is_bad[faults] = True
+    if is_bad.any():
+        row = int(is_bad.argmax())
+        raise TableError(
+            f"{piece.where(row)}: the weight in column {column!r} is "
+            f"{plain(cells)[row]!r}; a weight is finite and not negative"
+        )
+    return values
 
 
 def _parsed(columns: Sequence[pa.ChunkedArray]) -> FloatArray | None:

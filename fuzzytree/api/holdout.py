@@ -46,8 +46,8 @@ class Accuracy(msgspec.Struct, frozen=True):
     """The share of rows that were predicted right, for each fold.
 
     Attributes:
-        folds: The share in each fold that was tried. A row that gets no class counts
-            as wrong.
+        folds: The share in each fold that was tried, by the weights of rows. A row that
+            gets no class counts as wrong.
         rows: How many rows the folds are made of.
         of: How many rows the table has.
     """
@@ -106,8 +106,10 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def majority(table: Table) -> float:
-    """Return the accuracy of predicting the most common class for every row."""
-    return float(np.bincount(table.codes, table.weights).max() / table.rows)
+    """Return the accuracy, by weight, of always predicting the most common class."""
+    weights = table.row_weights if table.weights is None else table.weights
+    counts = np.bincount(table.codes, weights)
+    return float(counts.max() / counts.sum())
 
 
 def accuracy(
@@ -155,10 +157,12 @@ def accuracy(
             classes=classes,
             settings=_of_fold(settings, classes),
             categories=table.categories,
+            weights=None if table.row_weights is None else table.row_weights[kept],
         )
         predicted = _answered(learnt.tree, table, test)
         right = predicted == table.codes[test]
-        weight = None if table.weights is None else table.weights[test]
+        weights = table.row_weights if table.weights is None else table.weights
+        weight = None if weights is None else weights[test]
         shares.append(float(np.average(right, weights=weight)))
     return Accuracy(tuple(shares), len(rows), table.rows)
 
@@ -182,7 +186,7 @@ def front(table: Table, settings: LearningSettings) -> Front | None:
         settings=settings,
         categories=table.categories,
     )
-    learner.partial_fit(table.values.T, table.codes)
+    learner.partial_fit(table.values.T, table.codes, weights=table.row_weights)
     return learner.front()
 
 
@@ -191,7 +195,12 @@ def _of_fold(settings: LearningSettings, classes: Sequence[str]) -> LearningSett
     patterns = settings.patterns_per_class
     if isinstance(patterns, Mapping):
         patterns = {name: patterns.get(name, 1) for name in classes}
-    return msgspec.structs.replace(settings, patterns_per_class=patterns)
+    heavy = settings.class_weight
+    if isinstance(heavy, Mapping):
+        heavy = {name: heavy.get(name, 1.0) for name in classes}
+    return msgspec.structs.replace(
+        settings, patterns_per_class=patterns, class_weight=heavy
+    )
 
 
 def folds_of(codes: IntArray, folds: int, seed: int) -> IntArray:

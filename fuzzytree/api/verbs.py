@@ -60,6 +60,7 @@ from fuzzytree.tables import (
     Batch,
     Table,
     TableSource,
+    Weights,
     batches,
     class_names,
     path_of,
@@ -79,6 +80,7 @@ def learn(
     table: object,
     *,
     target: str | Sequence[object] | npt.NDArray[np.generic],
+    weights: Weights = None,
     ignore: Sequence[str] = (),
     name: str | None = None,
     units: Mapping[str, str] | None = None,
@@ -93,6 +95,10 @@ def learn(
             Polars, DuckDB, Ibis, Spark or Dask, which is not collected. Files of any
             length are read in bounded memory.
         target: The column of the classes, or the classes themselves.
+        weights: The column of the rows' weights, which is no input then, or the weights
+            themselves. A row of the whole weight k counts as k equal rows, and one of
+            the weight 0 is left out; of other weights only the ratios matter. All are 1
+            unless given. Lazy frames and tables of more than 2^25 numbers have none.
         ignore: Columns to leave out.
         name: Of the tree; the file's, or `tree`, unless given.
         units: The units of columns, by name.
@@ -100,7 +106,10 @@ def learn(
         progress: Called with the current step and the share that is done.
 
     Raises:
-        TableError: If a column is absent or holds text, or if there are no rows.
+        TableError: If a column is absent, if a weight is missing, infinite or negative,
+            or if there are no rows.
+        ValueError: If weights that are no column are not one number for each row, or
+            cannot be weights.
         LearningError: If nothing can be learnt from the table, or its target is
             continuous.
 
@@ -119,12 +128,22 @@ def learn(
     chosen, engine = settings or learning.LearningSettings(), engine_of(table)
     result: Table | learning.Learner
     if engine is not None:
+        if weights is not None:
+            raise TableError(
+                f"a {engine.type_name} of {engine.package} has no weights of rows, as "
+                "it is not collected: collect it first"
+            )
         from fuzzytree.api.engines.core import collect_frame
 
         result = collect_frame(table, engine, target, ignore=ignore, settings=chosen)
     else:
         result = learning.read_or_collect(
-            table, target=target, ignore=ignore, settings=chosen, progress=progress
+            table,
+            target=target,
+            weights=weights,
+            ignore=ignore,
+            settings=chosen,
+            progress=progress,
         )
     rows = result if isinstance(result, Table) else result.table()
     for column, text in learning.remarks(rows, lambda column: f"ignore=[{column!r}]"):
@@ -173,6 +192,7 @@ def learn_table(
         name=name,
         settings=settings,
         categories=table.categories,
+        weights=table.row_weights,
         progress=progress,
     )
     tree = with_label_type(learnt.tree, table.label_type)

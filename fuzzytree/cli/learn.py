@@ -70,6 +70,11 @@ class LearnOptions(RepresentationOptions):
     name: str | None = option(
         "--name TEXT", "Name of the tree; the name of TABLE by default."
     )
+    weight: str | None = option(
+        "--weight COLUMN",
+        "Column that holds the weight of each row, and is no input; 3 counts as three "
+        "equal rows, 0 leaves the row out.",
+    )
     ignore: Sequence[str] = ignore_option
     categorical: Sequence[str] = categorical_option
     units: Sequence[str] = several("--unit COLUMN=UNIT", "Unit of a column (repeat).")
@@ -177,6 +182,8 @@ def command(options: LearnOptions) -> None:
         check_place(options.output)
         check_place(_model_file(options.output, form))
     is_state = _is_states(options.tables)
+    if options.weight is not None and (is_state or options.model is not None):
+        raise click.UsageError("--weight: states count rows, which have no weights")
     work = _learnt if options.model is None else _counted
     tree, rows, facts = work(options, is_state=is_state)
     _write(options, tree, rows, form, is_data=not is_state and options.tables[0] != "-")
@@ -359,6 +366,7 @@ def _read(
     return read_or_collect(
         table_source(options.tables[0], options.delimiter, options.categorical),
         target=options.target,
+        weights=options.weight,
         ignore=options.ignore,
         settings=settings,
         name="standard input" if options.tables[0] == "-" else None,
@@ -500,6 +508,8 @@ def _read_text(table: Table) -> str:
     odd = [counted(table.missing, "missing cell")] if table.missing else []
     if table.unlabelled:
         odd.append(counted(table.unlabelled, "row") + " without a class left out")
+    if table.weightless:
+        odd.append(counted(table.weightless, "row") + " of weight 0 left out")
     return f"{text} ({', '.join(odd)})" if odd else text
 
 

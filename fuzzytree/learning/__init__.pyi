@@ -14,4 +14,3 @@ from .parts import read_or_collect as read_or_collect
 from .parts import refuse_repeated as refuse_repeated
 from .parts import state_content as state_content
 from .settings import LearningSettings as LearningSettings
-from .weights import checked_weights as checked_weights

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.cells import numbers_only, unmasked
+from fuzzytree.cells import checked_weights, numbers_only, unmasked
 from fuzzytree.errors import LearningError
 from fuzzytree.learning.assembly import AssembledTree, TermNames, assembled
 from fuzzytree.learning.choosing import chosen_tree
@@ -33,12 +33,7 @@ from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.units import FloatArray, IntArray, tallied
-from fuzzytree.learning.weights import (
-    MOST_COPIES,
-    RowWeights,
-    checked_weights,
-    row_weights,
-)
+from fuzzytree.learning.weights import MOST_COPIES, RowWeights, row_weights
 from fuzzytree.model import FuzzyTree, text_fault
 
 Progress = Callable[[str, float], None]

@@ -24,7 +24,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.columns import Contents
-from fuzzytree.errors import LearningError, ReadError
+from fuzzytree.errors import LearningError, ReadError, TableError
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning.findings import refuse_measurements
 from fuzzytree.learning.learner import ArrayLearner, Learnt, check_rows
@@ -39,6 +39,7 @@ from fuzzytree.tables import (
     LearntColumns,
     Table,
     TableSource,
+    Weights,
     columns_of,
 )
 
@@ -545,6 +546,7 @@ def read_or_collect(
     source: object,
     *,
     target: str | Sequence[object] | npt.NDArray[np.generic],
+    weights: Weights = None,
     ignore: Sequence[str] = (),
     settings: LearningSettings,
     name: str | None = None,
@@ -558,18 +560,25 @@ def read_or_collect(
     Args:
         source: The table, as `read_table` takes it.
         target: The column of the classes, or the classes themselves.
+        weights: The column of the rows' weights, the weights themselves, or None.
         ignore: Columns to leave out.
         settings: How to learn.
         name: What messages call the table; its path unless given.
         progress: Called with the number of rows so far, and 0.
 
     Raises:
-        TableError: As `read_table`.
+        TableError: As `read_table`; or if a table with weights is too large to be read
+            whole.
         LearningError: If the target holds measurements and no classes; or if a value
             is missing, and `missing` is `refuse`.
     """
     rows = LearningRows(
-        source, target=target, ignore=ignore, name=name, progress=progress
+        source,
+        target=target,
+        weights=weights,
+        ignore=ignore,
+        name=name,
+        progress=progress,
     )
     whole, cells, pieces = list[LearningPiece](), 0, iter(rows)
     for piece in pieces:
@@ -579,6 +588,11 @@ def read_or_collect(
             break
     else:
         return rows.table(whole)
+    if weights is not None:
+        raise TableError(
+            f"{rows.name} has more than {MOST_CELLS:,} numbers, and weights of rows "
+            "need a table that is read whole; repeat its rows instead, or take fewer"
+        )
     positions, classes = rows.labels.ordered()
     codes = np.concatenate([piece.codes for piece in whole])
     refuse_measurements(rows.name, rows.target, classes, positions[codes])

@@ -9,13 +9,11 @@ weight says when rounded, once at least, and each time with an equal share of it
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from fuzzytree.cells import unmasked
 from fuzzytree.learning.units import FloatArray, IntArray
 
 MOST_COPIES = 1 << 24
@@ -44,33 +42,6 @@ class RowWeights:
         for first in range(0, total, _PIECE):
             places = np.arange(first, min(total, first + _PIECE))
             yield np.searchsorted(ends, places, side="right")
-
-
-def checked_weights(
-    weights: Sequence[float] | npt.NDArray[np.generic], rows: int
-) -> FloatArray:
-    """Return the weights of some rows as numbers.
-
-    Raises:
-        ValueError: If there are more or fewer, one is negative, missing or infinite, or
-            all are 0.
-    """
-    found = unmasked(np.asanyarray(weights))
-    if found.dtype.kind not in "iufb":
-        raise ValueError("weights are numbers, one for each row")
-    if found.shape != (rows,):
-        shape = "x".join(map(str, found.shape)) or "1"
-        raise ValueError(f"{shape} weights, but {rows} rows")
-    values = found.astype(np.float64)
-    bad = np.flatnonzero(~((values >= 0) & np.isfinite(values)))
-    if len(bad):
-        raise ValueError(
-            f"the weight of row {bad[0] + 1} is {values[bad[0]]:g}; a weight is finite "
-            "and not negative"
-        )
-    if not values.any():
-        raise ValueError("all weights are zero, and a row of weight zero is left out")
-    return values
 
 
 def row_weights(values: FloatArray) -> RowWeights:

@@ -302,3 +302,20 @@ def test_a_full_disk_is_one_sentence(
     monkeypatch.setattr("os.fsync", full)
     message = "t.yaml: cannot be written: no space left on device\n"
     assert _refused(call, FEW) == message
+
+
+def test_a_column_of_weights_counts_in_the_tree_and_in_the_test(call: Call) -> None:
+    lines = [f"{k},{k % 3},{'soft' if k < 40 else 'firm'}" for k in range(90)]
+    Path("heavy.csv").write_text("\n".join(["a,w,grip", *lines]), "utf-8")
+    words = ("learn", "heavy.csv", "--target", "grip", "--weight", "w")
+    code, _, err = call(*words, "--class-weight", "balanced", "-o", "heavy.yaml")
+    assert code == 0
+    assert "2 classes (30 rows of weight 0 left out)" in err
+    assert "majority class 0.567" in err  # 51 of 90
+    tree = ft.load("heavy.yaml")
+    assert isinstance(tree, FuzzyTree)
+    assert tree.columns == ("a",)
+    assert call("collect", "few.csv", "--target", "grip", "-o", "few.state")[0] == 0
+    code, _, err = call("learn", "few.state", "--weight", "w", "-o", "few.yaml")
+    assert code == 2
+    assert "--weight: states count rows, which have no weights" in err

@@ -129,7 +129,7 @@ def test_classes_weigh_the_same_if_balanced() -> None:
     ("weights", "message"),
     [
         ([1.0, 2.0], "2 weights, but 4 rows"),
-        ([[1.0]] * 4, "4x1 weights, but 4 rows"),
+        ([[1.0]] * 4, "weights have the shape (4, 1), and they need (rows,)"),
         (
             [1.0, -1.0, 1.0, 1.0],
             "the weight of row 2 is -1; a weight is finite and not negative",
