@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fuzzytree.learning.clouds import clouds_of
 from fuzzytree.learning.cuts import TreeSplit
 from fuzzytree.learning.nodes import SplitRules
 from fuzzytree.learning.rows import TrainingRows
@@ -121,10 +122,13 @@ def grown(
     """
     tree = BinaryTree()
     todo = [(tree.add(rows, at), at, 0)]
+    whole = clouds_of(rows, at) if style == "centres" else None
     settled = 0
     while todo:
         node, inside, level = todo.pop()
-        split = best_split(rows, inside, rules, style) if level < depth else None
+        split = None
+        if level < depth:
+            split = best_split(rows, inside, rules, style, whole)
         if split is None:
             settled += len(inside)
             if progress is not None:

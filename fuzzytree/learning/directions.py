@@ -12,18 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from fuzzytree.learning.cuts import SplitAxis, rounded_to, tail
-from fuzzytree.learning.nodes import Chosen, SplitRules, best_cut
+from fuzzytree.learning.cuts import SplitAxis, rounded_to
+from fuzzytree.learning.nodes import Chosen, SplitRules
 from fuzzytree.learning.rows import TrainingRows
-from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _MOST_ROWS = 4_000
 _MOST_COLUMNS = 64
 _NEWTON_STEPS = 6
-_AXES = 2
-_ROUNDS = 10
-_PLACES = 64
-_OUTER = 8
 _OWN = 1e-12
 _FINE = 1e-5
 _SMALLEST = 1e-6
@@ -32,122 +28,12 @@ _DIGITS = 9
 _CHEAPEST = 2.0**-100  # gains divided by it are finite
 
 
-def class_groups(node: Chosen, rules: SplitRules) -> list[BoolArray]:
-    """Return groups of whole classes, as a cut on a discriminant axis parts them."""
-    if node.classes == 2:
-        return [node.codes == 1]
-    found: list[BoolArray] = []
-    standard = node.rows.standard[node.at]
-    means, sizes, within = _centres(node, standard, rules.shrinkage)
-    for axis in _discriminant_axes(means, sizes, within, _AXES).T:
-        values = np.round(standard @ axis, _DIGITS)
-        cut = best_cut(node, values, rules.min_rows)
-        if cut is None:
-            continue
-        above = tallied(node.codes, node.weights * (values > cut[1]), node.classes)
-        is_right = 2 * above > sizes
-        if is_right.any() and not is_right.all():
-            found.append(is_right[node.codes])
-    return found
-
-
-def centred_groups(node: Chosen, shrinkage: float) -> list[BoolArray]:
-    """Return the groups of whole classes that a cut parts with the least loss.
-
-    Each class is taken for a gaussian cloud, all with the same scatter; what counts is
-    the expected number of rows on the wrong side for each bit that the cut tells.
-    """
-    if node.classes == 2:
-        return [node.codes == 1]
-    standard = node.rows.standard[node.at]
-    if not standard.shape[1]:
-        return []
-    means, sizes, within = _centres(node, standard, shrinkage)
-    power = (sizes @ (means - sizes @ means / sizes.sum()) ** 2) / np.diag(within)
-    leading = np.argsort(-power, kind="stable")[:_AXES]
-    singles = np.eye(len(power))[:, leading]
-    far = _solved(within, (means - sizes @ means / sizes.sum()).T)
-    distance = np.einsum("fk,kf->k", far, means - sizes @ means / sizes.sum())
-    outer = np.argsort(-np.round(distance, _DIGITS), kind="stable")[:_OUTER]
-    axes = [_discriminant_axes(means, sizes, within, 3), singles, far[:, outer]]
-    best, lowest = None, np.inf
-    seen: set[bytes] = set()
-    for axis in np.hstack(axes).T:
-        loss, is_right = _least_loss(means, sizes, within, axis)
-        for _ in range(_ROUNDS):
-            if is_right.tobytes() in seen:
-                break
-            seen.add(is_right.tobytes())
-            if loss < lowest:
-                best, lowest = is_right, loss
-            right, left = sizes * is_right, sizes * ~is_right
-            step = right @ means / right.sum() - left @ means / left.sum()
-            loss, is_right = _least_loss(means, sizes, within, _solved(within, step))
-    return [] if best is None else [best[node.codes]]
-
-
-def _least_loss(
-    means: FloatArray, sizes: FloatArray, within: FloatArray, axis: FloatArray
-) -> tuple[float, BoolArray]:
-    """Return the least loss of a cut between classes on an axis, and what is right."""
-    places = means @ axis
-    spread = math.sqrt(max(float(axis @ within @ axis), 1e-300))
-    order = np.argsort(np.round(places / spread, _DIGITS), kind="stable")
-    ordered, weights = places[order], sizes[order]
-    behind = np.arange(len(order) - 1)
-    if len(behind) > _PLACES:
-        behind = np.unique(np.linspace(0, len(order) - 2, _PLACES).astype(np.int64))
-    cuts = ordered[behind] / 2 + ordered[behind + 1] / 2
-    is_right = np.arange(len(order)) > behind[:, None]
-    distance = np.where(is_right, ordered - cuts[:, None], cuts[:, None] - ordered)
-    lost = tail(distance / spread) @ weights
-    share = np.cumsum(weights)[behind] / weights.sum()
-    bits = -share * np.log(share) - (1 - share) * np.log1p(-share)
-    losses = np.round((lost / weights.sum() + 1e-4) / bits, _DIGITS)
-    best = int(losses.argmin())
-    chosen = np.zeros(len(order), bool)
-    chosen[order] = is_right[best]
-    return float(losses[best]), chosen
-
-
-def _centres(
-    node: Chosen, standard: FloatArray, shrinkage: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the means of the classes, their weights, and the scatter within them."""
-    order = np.argsort(node.codes, kind="stable")
-    starts = np.searchsorted(node.codes[order], np.arange(node.classes))
-    weighted = standard[order] * node.weights[order][:, None]
-    sizes = tallied(node.codes, node.weights, node.classes)
-    means = np.add.reduceat(weighted, starts, axis=0) / sizes[:, None]
-    moved = standard[order] - means[node.codes[order]]
-    within = (moved * node.weights[order][:, None]).T @ moved
-    freedom = max(len(order) - node.classes, 1) / len(order)
-    return means, sizes, _shrunk(within / (sizes.sum() * freedom), shrinkage)
-
-
-def _shrunk(scatter: FloatArray, shrinkage: float) -> FloatArray:
+def shrunk(scatter: FloatArray, shrinkage: float) -> FloatArray:
+    """Return a scatter with smaller entries beside its diagonal."""
     diagonal = np.maximum(np.diag(scatter), 1e-6)
     shrunk: FloatArray = scatter * (1.0 - shrinkage)
     np.einsum("ii->i", shrunk)[:] = diagonal
     return shrunk
-
-
-def _discriminant_axes(
-    means: FloatArray, sizes: FloatArray, within: FloatArray, count: int
-) -> FloatArray:
-    """Return Fisher's discriminant axes, the most powerful first; one a column."""
-    if not len(within):
-        return np.empty((0, 0))
-    values, vectors = np.linalg.eigh(within)
-    whitening = vectors / np.sqrt(np.maximum(values, 1e-9 * values.max()))
-    moved = (means - sizes @ means / sizes.sum()) * np.sqrt(sizes)[:, None]
-    spread = moved @ whitening
-    _, axes = np.linalg.eigh(spread.T @ spread)
-    count = min(len(means) - 1, count, axes.shape[1])
-    found = whitening @ axes[:, ::-1][:, :count]
-    largest = np.argmax(np.abs(np.round(found, _DIGITS)), axis=0)
-    axes = found * np.sign(found[largest, np.arange(count)])
-    return np.asarray(axes, np.float64)
 
 
 def _solved(scatter: FloatArray, step: FloatArray) -> FloatArray:
@@ -194,10 +80,10 @@ def axis_towards(
         direction = logistic_direction(chosen, sides, weights, 1.0)
     if direction is None:
         return None
-    return axis_of(node.rows, selected, direction, _spread(chosen @ direction, sides))
+    return axis_of(node.rows, selected, direction, spread_of(chosen @ direction, sides))
 
 
-def _spread(places: FloatArray, is_right: BoolArray) -> float:
+def spread_of(places: FloatArray, is_right: BoolArray) -> float:
     """Return the spread of two groups around their own means."""
     middle = np.where(is_right, places[is_right].mean(), places[~is_right].mean())
     return float(np.sqrt(np.mean((places - middle) ** 2)))
@@ -212,7 +98,7 @@ def turned(
     direction = logistic_direction(points, is_right, rows.weights[at], 1.0)
     if direction is None:
         return None
-    return axis_of(rows, selected, direction, _spread(points @ direction, is_right))
+    return axis_of(rows, selected, direction, spread_of(points @ direction, is_right))
 
 
 def selected_columns(
@@ -276,7 +162,7 @@ def _two_groups(
     means = [side @ points / side.sum() for side in sides]
     moved = points - np.where(is_right[:, None], means[1], means[0])
     scatter = (moved * weights[:, None]).T @ moved / weights.sum()
-    return means, _shrunk(scatter, shrinkage)
+    return means, shrunk(scatter, shrinkage)
 
 
 def logistic_direction(

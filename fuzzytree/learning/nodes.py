@@ -36,6 +36,19 @@ class SplitRules:
 
 
 @dataclass(frozen=True)
+class Clouds:
+    """What all rows of a tree say of its classes.
+
+    Attributes:
+        scatter: Within the classes, in standard units, shape (columns, columns).
+        sizes: The weight of each class.
+    """
+
+    scatter: FloatArray
+    sizes: FloatArray
+
+
+@dataclass(frozen=True)
 class Chosen:
     """The rows of a node, with its classes numbered from 0."""
 

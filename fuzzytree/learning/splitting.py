@@ -14,16 +14,13 @@ from typing import Literal
 
 import numpy as np
 
+from fuzzytree.learning.clouds import class_groups, parted_clouds
 from fuzzytree.learning.cuts import SplitAxis, TreeSplit, single
-from fuzzytree.learning.directions import (
-    axis_towards,
-    centred_groups,
-    class_groups,
-    logistic_cut,
-)
+from fuzzytree.learning.directions import axis_towards, logistic_cut
 from fuzzytree.learning.nodes import (
     DIGITS,
     Chosen,
+    Clouds,
     SplitRules,
     best_cut,
     between,
@@ -43,6 +40,9 @@ _FEW = 10
 _PURE = 1e-6
 _GOOD = 0.5
 
+_ROWS_PER_COLUMN = 5  # in nodes where rows may say more than their classes' clouds
+_PRICE_OF_ROWS = 1.0  # for each column
+
 _LOOK_PRICE = 10.0  # of a split by chance; where none gains more, two are looked for
 _LOOK_SHARE = 0.5  # of all rows, in nodes where this is done
 _LOOK_COLUMNS = 24
@@ -50,19 +50,30 @@ _LOOK_PLACES = 12
 
 
 def best_split(
-    rows: TrainingRows, at: IntArray, rules: SplitRules, style: Style
+    rows: TrainingRows,
+    at: IntArray,
+    rules: SplitRules,
+    style: Style,
+    whole: Clouds | None = None,
 ) -> TreeSplit | None:
-    """Return the split of a node in two, or None where none pays."""
+    """Return the split of a node in two, or None where none pays.
+
+    Args:
+        rows: To learn from.
+        at: Those of the node.
+        rules: What a split must keep to.
+        style: What splits the node.
+        whole: What all rows of the tree say of the classes, if these are parted whole.
+    """
     node = Chosen.of(rows, at)
     if node.classes < 2 or len(at) < 2 * rules.min_rows:
         return None
     total = tallied(node.codes, node.weights, node.classes)
     entropy = -float(information(total))
-    if style == "centres":
-        groups = centred_groups(node, rules.shrinkage)
-        best = _combined(node, rules, entropy, groups, keeps_groups=True)
-        if best is not None and best[0] > 0:
-            return best[1]
+    if whole is not None:
+        parted = _parted(node, rules, whole, entropy)
+        if parted is not None:
+            return parted
     best = None
     column = _best_column(node, rules, entropy)
     sides: list[BoolArray] = []
@@ -183,22 +194,9 @@ def _best_categories(
 
 
 def _combined(
-    node: Chosen,
-    rules: SplitRules,
-    entropy: float,
-    groups: Iterable[BoolArray],
-    *,
-    keeps_groups: bool = False,
+    node: Chosen, rules: SplitRules, entropy: float, groups: Iterable[BoolArray]
 ) -> tuple[float, TreeSplit] | None:
-    """Return the best split by a direction towards one of some groups of rows.
-
-    Args:
-        node: The rows.
-        rules: What a split must keep to.
-        entropy: Of the node.
-        groups: Which rows are of the second group.
-        keeps_groups: Whether the cut parts the groups, whatever their classes.
-    """
+    """Return the best split by a direction towards one of some groups of rows."""
     best: tuple[float, TreeSplit] | None = None
     seen: dict[bytes, BoolArray] = {}
     for is_right in groups:
@@ -206,33 +204,62 @@ def _combined(
         if min(right, len(is_right) - right) >= 2:
             seen.setdefault(is_right.tobytes(), is_right)
     ways = [(is_right, False) for is_right in seen.values()]
-    if not keeps_groups:
-        ways += [(is_right, True) for is_right in [*seen.values()][:1]]
+    ways += [(is_right, True) for is_right in [*seen.values()][:1]]
     for is_right, is_fine in ways:
         if is_fine and best is not None and best[0] > _GOOD * entropy:
             continue
         axis = axis_towards(node, is_right, rules, is_fine=is_fine)
-        found = None
-        if axis is not None:
-            found = _placed(node, axis, rules, is_right if keeps_groups else None)
-        if found is not None and axis is not None:
-            score, cut = found
-            price = _PRICE + _PRICE_OF_COLUMN * (len(axis.features) - 1)
-            gain = _gain(entropy, score, price)
+        if axis is None:
+            continue
+        values = axis.values(node.rows.values[node.at])
+        if not np.isfinite(values).all():
+            continue
+        found = best_cut(node, values, rules.min_rows)
+        if found is not None:
+            gain = _gain(entropy, found[0], _price_of(axis))
             if best is None or gain > best[0]:
-                best = gain, _split(axis, cut)
+                best = gain, _split(axis, found[1])
     return best
 
 
-def _placed(
-    node: Chosen, axis: SplitAxis, rules: SplitRules, is_right: BoolArray | None
-) -> tuple[float, float] | None:
-    """Return the score of the best cut on an axis, of classes or of two groups."""
+def _price_of(axis: SplitAxis) -> float:
+    return _PRICE + _PRICE_OF_COLUMN * (len(axis.features) - 1)
+
+
+def _parted(
+    node: Chosen, rules: SplitRules, whole: Clouds, entropy: float
+) -> TreeSplit | None:
+    """Return a split between whole classes, or None where it does not pay.
+
+    It follows the classes' clouds, or the rows themselves where these are many and gain
+    more by it than chance explains.
+    """
+    found = parted_clouds(node, rules, whole)
+    if found is None:
+        return None
+    axis, is_right = found
+    best = _between_groups(node, rules, axis, is_right, entropy)
+    if len(node.at) >= _ROWS_PER_COLUMN * len(axis.features):
+        other = axis_towards(node, is_right, rules)
+        if other is not None:
+            own = _between_groups(node, rules, other, is_right, entropy)
+            price = _PRICE_OF_ROWS * len(other.features)
+            if own is not None and (best is None or own[0] > best[0] + price):
+                best = own
+    return None if best is None else best[1]
+
+
+def _between_groups(
+    node: Chosen,
+    rules: SplitRules,
+    axis: SplitAxis,
+    is_right: BoolArray,
+    entropy: float,
+) -> tuple[float, TreeSplit] | None:
+    """Return the split where two groups are equally likely, if it gains anything."""
     values = axis.values(node.rows.values[node.at])
     if not np.isfinite(values).all():
         return None
-    if is_right is None:
-        return best_cut(node, values, rules.min_rows)
     cut = logistic_cut(values, is_right, node.weights)
     above = values > cut
     size = int(np.count_nonzero(above))
@@ -240,7 +267,8 @@ def _placed(
         return None
     cut = between(float(values[~above].max()), float(values[above].min()))
     counts = _counts(node, above.astype(np.int64), 2)
-    return float(information(counts).sum()), cut
+    gain = _gain(entropy, float(information(counts).sum()), _price_of(axis))
+    return (gain, _split(axis, cut)) if gain > 0 else None
 
 
 def _looked_ahead(
