@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -17,6 +18,7 @@ from fuzzytree.learning import (
     LearningReport,
     LearningSettings,
     importances,
+    refuse_measurements,
 )
 from fuzzytree.model import (
     DATE_UNIT,
@@ -65,7 +67,7 @@ def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
         table = numbers_only(X, "X")
     elif hasattr(X, "__array__") and not isinstance(X, np.ndarray):
         numbers_only(np.asarray(X), "X")  # a frame of times would become numbers
-    return validate_data(estimator, table, *map(_unmasked_labels, y), **options)
+    return validate_data(estimator, table, *map(_sound_labels, y), **options)
 
 
 def _as_numbers(
@@ -90,12 +92,16 @@ def _as_numbers(
     names = [name for name, kind in types if not kind.is_numeric()]
     if not names:
         return X, {}, ()
-    title, values = "X", dict.fromkeys(map(str, names), np.zeros(len(frame)))
+    values = dict.fromkeys(map(str, names), np.zeros(len(frame)))
     categories: dict[str, tuple[str, ...]] = {}
     dates: tuple[str, ...] = ()
     cells = frame.select(names).to_native()
     if variables is None:
-        table = read_table(cells, target=np.zeros(len(frame)), name=title)
+        others = [name for name in frame.columns if name not in names]
+        some = frame.select([*names, *others[:1]]).to_native()  # all may be left out
+        table = read_table(some, target=np.zeros(len(frame)), name="X")
+        for column, text in table.remarks:
+            warnings.warn(f"X: {column} has {text}", stacklevel=3)
         values |= dict(zip(table.columns, table.values, strict=True))
         categories, dates = dict(table.categories), table.dates
     else:
@@ -112,9 +118,15 @@ def _as_numbers(
     return frame.with_columns(*numbers).to_native(), categories, dates
 
 
-def _unmasked_labels(y: Any) -> Any:
+def _sound_labels(y: Any) -> Any:
+    """Return labels, unless some are masked or they cannot be sorted."""
     if np.ma.is_masked(y):
         raise ValueError("y holds masked labels")
+    labels = np.asanyarray(y)
+    if labels.dtype == object:
+        kinds = sorted({type(label).__name__ for label in labels.ravel().tolist()})
+        if len(kinds) > 1 and ("str" in kinds or "NoneType" in kinds):
+            raise ValueError(f"y holds labels of several kinds: {', '.join(kinds)}")
     return y
 
 
@@ -263,7 +275,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         check_classification_targets(labels)
         if len(values) == 1:
             raise ValueError("cannot learn from one sample (n_samples = 1)")
-        self._start(np.unique(labels), categories, dates)
+        classes, codes = np.unique(labels, return_inverse=True)
+        refuse_measurements("y", "", [*map(str, classes)], codes)
+        self._start(classes, categories, dates)
         return self._learn(values, labels, weights)
 
     def partial_fit(
@@ -558,7 +572,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 def _by_name(weights: ClassWeight) -> Mapping[str, float] | Literal["balanced"] | None:
     """Return weights of classes by their names in the tree."""
     if isinstance(weights, Mapping):
-        return {str(label): float(weight) for label, weight in weights.items()}
+        return {str(label): weight for label, weight in weights.items()}
     return weights
 
 

@@ -957,6 +957,8 @@ def _mixed_text(
     among = " and ".join(f"{n:,} {one}{'s' * (n > 1)}" for n, one in others)
     needed = others[-1][1] if others else "number"
     text = f"text where a {needed} is needed" if kind == "text" else f"a {kind}"
+    if kind == "other cell":
+        text = "no number, text, truth value or date"
     share = f" ({count:,} among {among})" if among else _more(count)
     return (
         f"{where}: column {name!r} holds {text}: "

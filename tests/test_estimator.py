@@ -196,13 +196,39 @@ def test_a_pipeline_and_a_grid_search_take_it() -> None:
     [
         (IRIS[:1], SPECIES[:1], "cannot learn from one sample (n_samples = 1)"),
         (IRIS[:9], SPECIES[:9], "cannot learn from one class: every row is '0'"),
+        (
+            IRIS,
+            np.arange(150),
+            "y: the target is continuous, with 150 different numbers in 150 rows, and "
+            "a tree predicts classes; divide the numbers into ranges and learn these",
+        ),
+        (
+            IRIS,
+            np.array([f"n{k}" for k in range(150)]),
+            "y: the target has another class in each of 150 rows, as an identifier "
+            "has, and nothing can be learnt about a class of one row; name the column "
+            "of the classes",
+        ),
+        (
+            IRIS[:3],
+            np.array([1, "a", None], object),
+            "y holds labels of several kinds: NoneType, int, str",
+        ),
+        (
+            pd.DataFrame({"a": [{}, {}, 1.0]}),
+            SPECIES[49:52],
+            "X, row 3: column 'a' holds a number: '1.0' (1 among 2 other cells)\n"
+            "  leave columns out with ignore (--ignore a), or take all their cells as "
+            "categories with categorical (--categorical a)",
+        ),
     ],
-    ids=["one row", "one class"],
+    ids=["one row", "one class", "numbers", "names", "kinds", "cells"],
 )
+@pytest.mark.filterwarnings("ignore:The number of unique classes")
 def test_a_table_that_teaches_nothing_is_refused(
     values: FloatArray, labels: IntArray, message: str
 ) -> None:
-    with pytest.raises(ValueError, match="cannot learn") as caught:
+    with pytest.raises(ValueError, match=r"learn|holds") as caught:
         FuzzyTreeClassifier().fit(values, labels)
     assert str(caught.value) == message
 
@@ -258,6 +284,20 @@ def test_a_frame_may_have_texts_dates_and_missing_values() -> None:
     assert ft.run(model.tree_, table).classes == found
     table["island"] = "Mars"
     assert len(model.predict(table)) == rows
+
+
+def test_a_column_that_is_left_out_is_named() -> None:
+    table = pd.DataFrame(IRIS[:, 2:], columns=["length", "width"])
+    table["flower"] = [f"flower {k}" for k in range(150)]
+    with pytest.warns(UserWarning, match="flower") as caught:
+        model = FuzzyTreeClassifier().fit(table, SPECIES)
+    assert str(caught[0].message) == (
+        "X: flower has 150 different texts in 150 rows, as an identifier has; it is "
+        "left out; --categorical flower keeps it"
+    )
+    assert set(model.tree_.inputs) <= {"length", "width"}
+    assert model.feature_importances_[2] == 0
+    assert (model.predict(table) == SPECIES).mean() > 0.9
 
 
 def test_a_weight_counts_as_so_many_equal_rows_of_a_frame() -> None:

@@ -1,4 +1,5 @@
 from .findings import LearningReport as LearningReport
+from .findings import refuse_measurements as refuse_measurements
 from .findings import remarks as remarks
 from .front import Front as Front
 from .importance import importances as importances

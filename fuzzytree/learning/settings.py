@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from numbers import Real
 from typing import Literal
 
 import msgspec
@@ -121,14 +122,15 @@ class LearningSettings(
             of = f" of class {name!r}" if name else ""
             text = f"patterns_per_class{of} is at least 1, not {number!r}"
             claims.append((number >= 1, text))
-        of_class = self.class_weight
-        if isinstance(of_class, str):
-            text = f"class_weight is 'balanced' or a weight by class, not {of_class!r}"
-            claims.append((of_class == "balanced", text))
-        else:
-            for name, weight in (of_class or {}).items():
+        of_class: object = self.class_weight
+        if isinstance(of_class, Mapping):
+            for name, weight in of_class.items():
+                is_right = isinstance(weight, Real) and 0 < float(weight) < math.inf
                 text = f"the weight of class {name!r} is finite and above 0"
-                claims.append((0 < weight < math.inf, f"{text}, not {weight!r}"))
+                claims.append((is_right, f"{text}, not {weight!r}"))
+        else:
+            text = f"class_weight is 'balanced' or a weight by class, not {of_class!r}"
+            claims.append((of_class in (None, "balanced"), text))
         for name, cost in self.costs.items():
             text = f"the cost of {name!r} is finite and at least 0, not {cost!r}"
             claims.append((0 <= cost < math.inf, text))

@@ -178,6 +178,8 @@ def test_weights_of_classes_are_checked() -> None:
         learnt(values, codes, None, LearningSettings(class_weight={"c7": 2.0}))
     for wanted, mode, message in (
         ("even", "default", "class_weight is 'balanced' or a weight by class"),
+        ([1.0, 2.0], "default", "class_weight is 'balanced' or a weight by class"),
+        ({"c0": "a"}, "default", "the weight of class 'c0' is finite and above 0"),
         ({"c0": 0.0}, "default", "the weight of class 'c0' is finite and above 0"),
         ("balanced", "paper", "class_weight is a setting of the mode 'default'"),
     ):
