@@ -35,6 +35,7 @@ _MOST_CLASSES = 1_000
 _SLACK = 0.5
 _STEPS_BACK = 3  # from the largest cost that is good enough: to half of it
 _SURE = 0.5
+_COINCIDENCES = 0.02  # equal pairs for each distinct row, from which on they are many
 
 Progress = Callable[[str, float], None]
 
@@ -136,20 +137,23 @@ def folds_of_rows(rows: TrainingRows, seed: int, *, repeats: int) -> list[Fold]:
 
 
 def _copies(rows: TrainingRows) -> IntArray:
-    """Return a number for each row, the same for copies of one.
+    """Return a number for each row, the same for copies of one; they follow each other.
 
-    Equal rows are copies, and no coincidence, if some column has another value in at
-    least half of the distinct rows. They follow each other.
+    Equal rows are copies, and no coincidence, if few of the distinct rows would be
+    equal with columns that do not depend on each other.
     """
     is_new = np.ones(rows.size, bool)
     is_new[1:] = np.diff(rows.codes) != 0
     is_new[1:] |= (rows.values[1:] != rows.values[:-1]).any(axis=1)
-    if not is_new.all():
-        distinct = rows.values[is_new].T
-        most = max((len(np.unique(column)) for column in distinct), default=0)
-        if 2 * most >= distinct.shape[1]:
-            return np.cumsum(is_new) - 1
-    return np.arange(rows.size)
+    if is_new.all():
+        return np.arange(rows.size)
+    size = int(np.count_nonzero(is_new))
+    chance = 1.0  # that two distinct rows have the same class and values
+    for column in (rows.codes[is_new], *rows.values[is_new].T):
+        _, counts = np.unique(column, return_counts=True)
+        chance *= float((counts / size) @ (counts / size))
+    is_coincidence = (size - 1) / 2 * chance > _COINCIDENCES
+    return np.arange(rows.size) if is_coincidence else np.cumsum(is_new) - 1
 
 
 @dataclass(frozen=True)

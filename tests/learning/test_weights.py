@@ -103,9 +103,10 @@ def test_heavy_rows_decide() -> None:
         assert {leaf.label for leaf in tree.leaves} == {label}
 
 
-def test_copies_of_a_row_do_not_make_a_tree_larger() -> None:
+@pytest.mark.parametrize("digits", [9, 0])
+def test_copies_of_a_row_do_not_make_a_tree_larger(digits: int) -> None:
     rng = np.random.default_rng(0)
-    values = rng.normal(size=(200, 3))
+    values = np.round(rng.normal(size=(200, 9)), digits)
     codes = rng.integers(0, 2, 200)  # nothing can be learnt
     tree = learnt(values, codes, np.full(200, 4)).tree
     assert len(tree.leaves) <= 3
