@@ -281,7 +281,11 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return self._learn(values, labels, weights)
 
     def partial_fit(
-        self, X: npt.ArrayLike, y: npt.ArrayLike, classes: npt.ArrayLike | None = None
+        self,
+        X: npt.ArrayLike,
+        y: npt.ArrayLike,
+        classes: npt.ArrayLike | None = None,
+        sample_weight: npt.ArrayLike | None = None,
     ) -> Self:
         """Take more rows and learn again from all rows so far.
 
@@ -294,6 +298,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             X: As in `fit`.
             y: As in `fit`; labels out of `classes`.
             classes: All labels that will come; needed in the first call.
+            sample_weight: As in `fit`; whole numbers, if more than one chunk comes.
 
         Returns:
             The classifier itself.
@@ -326,7 +331,10 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             raise ValueError(
                 f"label {unknown[0]!s} is not among the classes {self.classes_}"
             )
-        return self._learn(values, labels)
+        weights = None
+        if sample_weight is not None:
+            weights = checked_weights(np.asarray(sample_weight), len(values))
+        return self._learn(values, labels, weights)
 
     def _finite(self) -> bool | str:
         """Return which numbers scikit-learn's check takes."""

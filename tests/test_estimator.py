@@ -167,6 +167,18 @@ def test_chunks_of_any_size_give_the_tree_of_the_whole_table() -> None:
         assert model.tree_ == whole.tree_
 
 
+def test_chunks_may_have_whole_weights() -> None:
+    weights = np.arange(150) % 4
+    whole = FuzzyTreeClassifier().fit(IRIS, SPECIES, sample_weight=weights)
+    model = FuzzyTreeClassifier()
+    order = np.arange(150) * 7 % 150
+    for rows in np.array_split(order, 3):
+        model.partial_fit(IRIS[rows], SPECIES[rows], [0, 1, 2], weights[rows])
+    assert model.tree_ == whole.tree_
+    with pytest.raises(ValueError, match="all rows at once, not in chunks"):
+        model.partial_fit(IRIS, SPECIES, sample_weight=weights + 0.5)
+
+
 @pytest.mark.parametrize(
     ("classes", "message"),
     [
