@@ -25,6 +25,7 @@ from fuzzytree.model import (
     PARTS,
     FuzzyTree,
     Variable,
+    depth,
     label_type_of,
     with_label_type,
 )
@@ -466,7 +467,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def get_depth(self) -> int:
         """Return how many conditions lead to the deepest leaf."""
         check_is_fitted(self)
-        return max(map(len, _paths(self.tree_)))
+        return depth(self.tree_)
 
     def get_n_leaves(self) -> int:
         """Return how many leaves the tree has."""

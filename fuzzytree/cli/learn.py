@@ -37,7 +37,7 @@ from fuzzytree.cli.representation import (
 )
 from fuzzytree.errors import TableError
 from fuzzytree.files import check_place, read_bounded, write_atomically
-from fuzzytree.model import Document, Format, printable
+from fuzzytree.model import Document, Format, depth, printable
 
 if TYPE_CHECKING:
     from fuzzytree.api import Accuracy, LeafCounts, Summary
@@ -197,7 +197,7 @@ def _learnt(
     """Return a tree of all rows, what to say about it, and the facts."""
     from fuzzytree.api import accuracy, front, learn_table
     from fuzzytree.learning import remarks
-    from fuzzytree.report import counted, depth
+    from fuzzytree.report import counted
     from fuzzytree.tables import Table
 
     settings, units_of = _settings(options), dict(_pairs("--unit", options.units))

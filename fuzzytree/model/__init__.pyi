@@ -163,6 +163,7 @@ from .tree import Leaf as Leaf
 from .tree import Node as Node
 from .tree import Sets as Sets
 from .tree import Use as Use
+from .tree import depth as depth
 from .tree import interval_names as interval_names
 from .tree import intervals as intervals
 from .tree import node_mistakes as node_mistakes

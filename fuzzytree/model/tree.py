@@ -180,6 +180,17 @@ def with_label_type(
     return msgspec.structs.replace(tree, semantics=semantics)
 
 
+def depth(tree: FuzzyTree) -> int:
+    """Return how many nodes the longest path of a tree has."""
+    # Nodes stand before those below them.
+    depths = [1] * len(tree.nodes)
+    for number, node in enumerate(tree.nodes):
+        for branch in node.branches:
+            if branch.node is not None:
+                depths[branch.node - 1] = depths[number] + 1
+    return max(depths, default=0)
+
+
 def outline(tree: FuzzyTree) -> Iterator[str]:
     """Yield the tree line by line, two spaces a level, branches in interval order."""
     todo: list[tuple[int, Branch]] = []

@@ -16,7 +16,6 @@ from .formats import overview_lines as overview_lines
 from .formats import runtime_facts as runtime_facts
 from .markup import Markup as Markup
 from .markup import mark as mark
-from .models import depth as depth
 from .models import document_facts as document_facts
 from .models import document_text as document_text
 from .models import fact_lines as fact_lines

@@ -34,6 +34,7 @@ from fuzzytree.model import (
     SystemRule,
     Trapezoid,
     Variable,
+    depth,
     intervals,
     kind_of,
     sentence,
@@ -188,15 +189,6 @@ def kind_text(model: FuzzyTree | RuleBase) -> str:
         return f"tree, {counted(len(model.nodes), 'node')}, {sizes}"
     kind = f"{model.kind} " if model.kind else ""
     return f"{kind}rule base, {counted(len(model.rules), 'rule')}"
-
-
-def depth(tree: FuzzyTree) -> int:
-    """Return how many nodes the longest path of a tree has."""
-    depths = [0] * (len(tree.nodes) + 1)
-    for position in range(len(tree.nodes), 0, -1):
-        below = [depths[b.node] for b in tree.nodes[position - 1].branches if b.node]
-        depths[position] = 1 + max(below, default=0)
-    return depths[1] if tree.nodes else 0
 
 
 def tree_lines(tree: FuzzyTree) -> Iterator[str]:

@@ -13,7 +13,7 @@ from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges, used_terms
-from fuzzytree.model import FuzzyTree
+from fuzzytree.model import depth
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
@@ -51,17 +51,6 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     message = "FT501.size-of-view" if is_view else "FT501.size"
     how = Computed("counted, and integrated in fractions")
     yield audit_answer(message, "the rule base", how, measures=tuple(measures))
-
-
-def depth(tree: FuzzyTree) -> int:
-    """Return how many nodes the longest path of a tree has."""
-    # Nodes stand before those below them.
-    depths = [1] * len(tree.nodes)
-    for number, node in enumerate(tree.nodes):
-        for branch in node.branches:
-            if branch.node is not None:
-                depths[branch.node - 1] = depths[number] + 1
-    return max(depths, default=0)
 
 
 def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:

@@ -9,10 +9,10 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.complexity import depth
 from fuzzytree.auditing.findings.records import AuditSelection
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model.rulebase import Points, Proposition, Rule, RuleBase, Term, Variable
+from fuzzytree.model.tree import depth
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
