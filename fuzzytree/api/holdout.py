@@ -73,6 +73,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
         classes: The classes.
         missing_cells: Cells without a value.
         rows_without_class: Rows that were left out because they have no class.
+        rows_without_weight: Rows that were left out because their weight is 0.
         remarks: Columns that look unsuitable, each with the reason.
         inputs: The columns that the tree needs.
         leaves: Leaves of the tree.
@@ -93,6 +94,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     classes: tuple[str, ...]
     missing_cells: int
     rows_without_class: int
+    rows_without_weight: int
     remarks: dict[str, str]
     inputs: tuple[str, ...]
     leaves: int

@@ -486,6 +486,7 @@ def _summary(
         classes=table.classes,
         missing_cells=table.missing,
         rows_without_class=table.unlabelled,
+        rows_without_weight=table.weightless,
         remarks=dict(noticed),
         inputs=learnt.tree.inputs,
         leaves=len(learnt.tree.leaves),

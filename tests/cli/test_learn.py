@@ -308,10 +308,12 @@ def test_a_column_of_weights_counts_in_the_tree_and_in_the_test(call: Call) -> N
     lines = [f"{k},{k % 3},{'soft' if k < 40 else 'firm'}" for k in range(90)]
     Path("heavy.csv").write_text("\n".join(["a,w,grip", *lines]), "utf-8")
     words = ("learn", "heavy.csv", "--target", "grip", "--weight", "w")
-    code, _, err = call(*words, "--class-weight", "balanced", "-o", "heavy.yaml")
+    words = (*words, "--class-weight", "balanced", "-o", "heavy.yaml")
+    code, out, err = call(*words, "--json")
     assert code == 0
     assert "2 classes (30 rows of weight 0 left out)" in err
     assert "majority class 0.567" in err  # 51 of 90
+    assert json.loads(out)["rows_without_weight"] == 30
     tree = ft.load("heavy.yaml")
     assert isinstance(tree, FuzzyTree)
     assert tree.columns == ("a",)
