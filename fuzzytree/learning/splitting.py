@@ -106,15 +106,14 @@ def _best_column(
 ) -> tuple[float, TreeSplit] | None:
     """Return the best split by one column and its score."""
     rows = node.rows
-    size = len(rows.owners)
-    if not size or size * node.classes > _MOST_CELLS:
+    if not len(rows.owners) or len(rows.owners) * node.classes > _MOST_CELLS:
         return None
-    scores = _bin_scores(node, rules.min_rows)
+    scores, owners = _bin_scores(node, rules.min_rows)
     if not np.isfinite(scores).any():
         return None
-    cheap = -rules.costs[rows.searched][rows.owners]
-    best = int(np.lexsort((np.arange(size)[::-1], cheap, scores))[-1])
-    place = int(rows.owners[best])
+    cheap = -rules.costs[rows.searched][owners]
+    best = int(np.lexsort((np.arange(len(owners))[::-1], cheap, scores))[-1])
+    place = int(owners[best])
     column = int(rows.searched[place])
     if rows.categories[column] > 2:
         return _best_categories(node, column, rules.min_rows, entropy)
@@ -132,25 +131,33 @@ def _gain(entropy: float, score: float, price: float) -> float:
     return entropy + score - (price if score < -_PURE else 0.0)
 
 
-def _bin_scores(node: Chosen, min_rows: int) -> FloatArray:
-    """Return the score of a cut behind each bin, shape (bins,)."""
+def _bin_scores(node: Chosen, min_rows: int) -> tuple[FloatArray, IntArray]:
+    """Return the score of a cut behind each bin, and the searched column of each bin.
+
+    Where a node has few rows, bins that hold none of them are left out.
+    """
     rows = node.rows
-    size, columns = len(rows.owners), len(rows.searched)
-    bins = rows.bins[node.at]
+    bins, owners = rows.bins[node.at], rows.owners
+    columns = len(rows.searched)
+    if bins.size < len(owners):
+        used, places = np.unique(bins, return_inverse=True)
+        bins, owners = places.reshape(bins.shape), owners[used]
+    size = len(owners)
+    starts = np.searchsorted(owners, np.arange(columns))
     cells = (bins * node.classes + node.codes[:, None]).ravel()
     weights = np.repeat(node.weights, columns)
     counts = tallied(cells, weights, size * node.classes)
     below = np.cumsum(counts.reshape(size, node.classes), axis=0)
     sizes = np.cumsum(np.bincount(bins.ravel(), minlength=size))
-    first = rows.starts[:-1][rows.owners]
+    first = starts[owners]
     below -= np.where(first > 0, 1.0, 0.0)[:, None] * below[first - 1]
     sizes = sizes - np.where(first > 0, sizes[first - 1], 0)
-    total = below[rows.starts[1] - 1] if columns else below[-1]
+    total = below[starts[1] - 1] if columns > 1 else below[-1]
     above = np.maximum(total - below, 0.0)
     below = np.maximum(below, 0.0)
     scores = np.round(information(below) + information(above), DIGITS)
     is_open = (sizes >= min_rows) & (len(node.at) - sizes >= min_rows)
-    return np.where(is_open, scores, -np.inf)
+    return np.where(is_open, scores, -np.inf), owners
 
 
 def _split(axis: SplitAxis, *cuts: float, first: int = 0) -> TreeSplit:
@@ -280,7 +287,8 @@ def _looked_ahead(
     if not len(rows.owners) or node.classes > _LOOK_PLACES or is_small:
         return None
     scores = np.full(len(rows.searched), -np.inf)
-    np.maximum.at(scores, rows.owners, _bin_scores(node, rules.min_rows))
+    found, owners = _bin_scores(node, rules.min_rows)
+    np.maximum.at(scores, owners, found)
     columns = np.argsort(-scores, kind="stable")[:_LOOK_COLUMNS]
     coarse = {int(c): _coarse(node, int(c)) for c in np.sort(columns)}
     usable = [c for c, (_, ends) in coarse.items() if len(ends) > 1]
