@@ -27,7 +27,9 @@ _LEADING = 3
 _ROUNDS = 10
 _PLACES = 64
 _MOST_PAIRS = 40
-_MOST_STARTS = 40_000  # pairs times classes
+_FEWEST_PAIRS = 4
+_PAIRS_BY_CLASSES = 20_000  # pairs times all classes of a table
+_KEPT_STARTS = 10
 _RIDGE = 0.01
 _STRAY = 0.2  # share of a class; what is less came to a node by chance
 _FEW_COLUMNS = 16
@@ -85,7 +87,8 @@ def parted_clouds(
     white = _whitening(scatter)
     middle = sizes @ means / sizes.sum()
     places = (means - middle) @ white
-    found = _best_groups(places[counts], sizes[counts])
+    pairs = max(_FEWEST_PAIRS, min(_MOST_PAIRS, _PAIRS_BY_CLASSES // len(whole.sizes)))
+    found = _best_groups(places[counts], sizes[counts], pairs)
     if found is None:
         return None
     axis, groups = found
@@ -112,30 +115,33 @@ def parted_clouds(
 
 
 def _best_groups(
-    places: FloatArray, sizes: FloatArray
+    places: FloatArray, sizes: FloatArray, pairs: int
 ) -> tuple[FloatArray, BoolArray] | None:
     """Return the axis on which a cut parts clouds of spread 1 best, and the groups."""
     basis = _span(places, sizes)
     places = places @ basis.T
-    one, other = _pairs(len(places))
+    one, other = _pairs(len(places), pairs)
     leading = np.eye(len(basis))[:_LEADING]
+    tried: list[tuple[float, BoolArray, FloatArray]] = []
+    for start in [*leading, *(places[one] - places[other])]:
+        if start.any():
+            loss, groups = _least_loss(places, sizes, start)
+            tried.append((loss, groups, start))
     best, lowest = None, np.inf
     seen: set[bytes] = set()
-    for start in [*leading, *(places[one] - places[other])]:
-        axis: FloatArray | None = start
-        is_known = False
+    for loss, groups, start in sorted(tried, key=lambda one: one[0])[:_KEPT_STARTS]:
+        axis, is_known = start, False
         for _ in range(_ROUNDS):
-            if axis is None or not axis.any():
-                break
-            loss, groups = _least_loss(places, sizes, axis)
             if loss < lowest:
                 best, lowest = (axis @ basis, groups), loss
-            if is_known:
-                break
             key = groups.tobytes()
+            better = None if is_known else _parting(places, sizes, groups)
+            if better is None:
+                break
             is_known = key in seen
             seen.add(key)
-            axis = _parting(places, sizes, groups)
+            axis = better
+            loss, groups = _least_loss(places, sizes, axis)
     return best
 
 
@@ -146,14 +152,13 @@ def _span(places: FloatArray, sizes: FloatArray) -> FloatArray:
     return np.asarray(basis[strengths > 1e-9 * strengths.max()], np.float64)
 
 
-def _pairs(count: int) -> tuple[IntArray, IntArray]:
+def _pairs(count: int, most: int) -> tuple[IntArray, IntArray]:
     """Return pairs of classes: all, or some where there are many."""
-    if count * (count - 1) <= 2 * _MOST_PAIRS:
+    if count * (count - 1) <= 2 * most:
         one, other = np.triu_indices(count, 1)
         return one, other
-    size = max(2, min(_MOST_PAIRS, _MOST_STARTS // count))
-    drawn = (hashed(np.arange(2 * size)) % np.uint64(count)).astype(np.int64)
-    one, other = drawn[:size], drawn[size:]
+    drawn = (hashed(np.arange(2 * most)) % np.uint64(count)).astype(np.int64)
+    one, other = drawn[:most], drawn[most:]
     return one[one != other], other[one != other]
 
 
