@@ -15,6 +15,7 @@ from fuzzytree.cells import checked_weights, numbers_only
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import (
     ArrayLearner,
+    ClassWeight,
     LearningReport,
     LearningSettings,
     importances,
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
 LabelArray = npt.NDArray[np.generic]
 Mode = Literal["default", "paper"]
 PatternsPerClass = int | Mapping[str, int] | None
-ClassWeight = Mapping[Any, float] | Literal["balanced"] | None
+LabelWeight = Mapping[Any, float] | Literal["balanced"] | None
 
 _LEAST_PROBABILITY = 0.5 / PARTS  # half the smallest one that a leaf can have
 
@@ -185,7 +186,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     mode: Mode
     patterns_per_class: PatternsPerClass
-    class_weight: ClassWeight
+    class_weight: LabelWeight
     tree_: FuzzyTree
     report_: LearningReport
     classes_: LabelArray
@@ -210,7 +211,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         shrinkage: float = 1e-3,
         entry: float = 2.0,
         costs: Mapping[str, float] | None = None,
-        class_weight: ClassWeight = None,
+        class_weight: LabelWeight = None,
         seed: int = 0,
     ) -> None:
         self.mode = mode
@@ -578,7 +579,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return np.array([number[leaf.label] for leaf in self.tree_.leaves], np.int64)
 
 
-def _by_name(weights: ClassWeight) -> Mapping[str, float] | Literal["balanced"] | None:
+def _by_name(weights: LabelWeight) -> ClassWeight:
     """Return weights of classes by their names in the tree."""
     if isinstance(weights, Mapping):
         return {str(label): weight for label, weight in weights.items()}

@@ -18,6 +18,7 @@ from fuzzytree.learning import (
     Front,
     LearningReport,
     LearningSettings,
+    class_weights,
     learn_arrays,
 )
 from fuzzytree.model import FloatArray, FuzzyTree, IntArray
@@ -46,8 +47,8 @@ class Accuracy(msgspec.Struct, frozen=True):
     """The share of rows that were predicted right, for each fold.
 
     Attributes:
-        folds: The share in each fold that was tried, by the weights of rows. A row that
-            gets no class counts as wrong.
+        folds: The share in each fold that was tried, by the weights of rows and
+            classes. A row that gets no class counts as wrong.
         rows: How many rows the folds are made of.
         of: How many rows the table has.
     """
@@ -77,9 +78,9 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
         remarks: Columns that look unsuitable, each with the reason.
         inputs: The columns that the tree needs.
         leaves: Leaves of the tree.
-        accuracy: The cross-validated accuracy, the mean over the folds; null without
-            a test.
-        majority: The accuracy of predicting the most common class for every row.
+        accuracy: The cross-validated accuracy, by the weights of rows and classes, the
+            mean over the folds; null without a test.
+        majority: The accuracy, by the same weights, of always predicting one class.
         folds: The accuracy of each fold; null without a test.
         rows_tested: How many rows the folds are made of; null without a test.
         seed: Of the folds.
@@ -107,11 +108,26 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     front: Front | None = None
 
 
-def majority(table: Table) -> float:
-    """Return the accuracy, by weight, of always predicting the most common class."""
-    weights = table.row_weights if table.weights is None else table.weights
-    counts = np.bincount(table.codes, weights)
+def majority(table: Table, settings: LearningSettings) -> float:
+    """Return the accuracy, by weight, of always predicting the same class.
+
+    Args:
+        table: The table.
+        settings: How to learn; weights of classes count.
+    """
+    counts = np.bincount(table.codes, _weights(table, settings))
     return float(counts.max() / counts.sum())
+
+
+def _weights(table: Table, settings: LearningSettings) -> FloatArray | None:
+    """Return the weights of rows times those of their classes; None if all are 1."""
+    weights = table.row_weights if table.weights is None else table.weights
+    if settings.class_weight is None:
+        return weights
+    found = np.ones(len(table.codes)) if weights is None else weights
+    heavy = class_weights(settings.class_weight, table.classes, table.codes, found)
+    whole: FloatArray = found * heavy[table.codes]
+    return whole
 
 
 def accuracy(
@@ -142,6 +158,7 @@ def accuracy(
     codes = table.codes[rows]
     fold = folds_of(codes, folds, seed)
     shares: list[float] = []
+    weights = _weights(table, settings)
     most = min(_CLASSES // len(table.classes), _COLUMNS // width)
     tried = max(1, min(folds, most))
     for number in range(tried):
@@ -163,7 +180,6 @@ def accuracy(
         )
         predicted = _answered(learnt.tree, table, test)
         right = predicted == table.codes[test]
-        weights = table.row_weights if table.weights is None else table.weights
         weight = None if weights is None else weights[test]
         shares.append(float(np.average(right, weights=weight)))
     return Accuracy(tuple(shares), len(rows), table.rows)

@@ -233,13 +233,13 @@ def _learnt(
         begin = time.perf_counter()
         with progress_bar(quiet=is_silent) as show:
             tested = accuracy(found, settings, seed=settings.seed, progress=show)
-        said = _timed(_accuracy_text(tested, found), begin)
+        said = _timed(_accuracy_text(tested, found, settings), begin)
         rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
         small = front(found, settings)
         rows += _front_rows(small)
     if options.front is not None:
         rows.append(_drawn(small, options.front, _title(options)))
-    facts = _summary(found, noticed, learnt, tested, settings.seed, options.output)
+    facts = _summary(found, noticed, learnt, tested, settings, options.output)
     facts = msgspec.structs.replace(facts, front=small)
     return tree, rows, facts
 
@@ -472,7 +472,7 @@ def _summary(
     noticed: Mapping[str, str],
     learnt: Learnt,
     tested: Accuracy | None,
-    seed: int,
+    settings: LearningSettings,
     output: str,
 ) -> Summary:
     from fuzzytree.api import Summary, majority
@@ -491,10 +491,10 @@ def _summary(
         inputs=learnt.tree.inputs,
         leaves=len(learnt.tree.leaves),
         accuracy=tested.mean if tested else None,
-        majority=majority(table),
+        majority=majority(table, settings),
         folds=tested.folds if tested else None,
         rows_tested=tested.rows if tested else None,
-        seed=seed,
+        seed=settings.seed,
         report=learnt.report,
     )
 
@@ -514,11 +514,15 @@ def _read_text(table: Table) -> str:
     return f"{text} ({', '.join(odd)})" if odd else text
 
 
-def _accuracy_text(tested: Accuracy | None, table: Table) -> str:
+def _accuracy_text(
+    tested: Accuracy | None, table: Table, settings: LearningSettings
+) -> str:
     from fuzzytree.api import majority
     from fuzzytree.report import counted
 
-    baseline = f"majority class {majority(table):.3f}"
+    baseline = f"majority class {majority(table, settings):.3f}"
+    if settings.class_weight is not None:
+        baseline = f"by the weights of classes; {baseline}"
     if tested is None:
         return f"too few rows for cross-validation ({baseline})"
     folds = counted(len(tested.folds), "fold")

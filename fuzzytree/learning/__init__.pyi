@@ -14,4 +14,6 @@ from .parts import open_state as open_state
 from .parts import read_or_collect as read_or_collect
 from .parts import refuse_repeated as refuse_repeated
 from .parts import state_content as state_content
+from .settings import ClassWeight as ClassWeight
 from .settings import LearningSettings as LearningSettings
+from .weights import class_weights as class_weights

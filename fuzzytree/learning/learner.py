@@ -33,7 +33,12 @@ from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.units import FloatArray, IntArray, tallied
-from fuzzytree.learning.weights import MOST_COPIES, RowWeights, row_weights
+from fuzzytree.learning.weights import (
+    MOST_COPIES,
+    RowWeights,
+    class_weights,
+    row_weights,
+)
 from fuzzytree.model import FuzzyTree, text_fault
 
 Progress = Callable[[str, float], None]
@@ -286,18 +291,10 @@ class ArrayLearner:
         counts = moments.counts if drops else self.statistics.counts()
         kept = np.bincount(sample.codes, minlength=len(self.classes))
         supports = (counts / np.maximum(kept, 1))[sample.codes] * shares
-        weights = supports * self._class_weights(sample, supports)[sample.codes]
-        return _Ready(table, sample, moments, supports, weights, costs)
-
-    def _class_weights(self, sample: Sample, weights: FloatArray) -> FloatArray:
-        """Return by what the weights of each class are multiplied."""
         wanted = self.settings.class_weight
-        if wanted == "balanced":
-            totals = tallied(sample.codes, weights, len(self.classes))
-            shares = np.where(totals > 0, totals, np.inf) / totals.sum()
-            balanced: FloatArray = 1.0 / (np.count_nonzero(totals) * shares)
-            return balanced
-        return np.array([(wanted or {}).get(name, 1.0) for name in self.classes])
+        heavy = class_weights(wanted, self.classes, sample.codes, supports)
+        weights = supports * heavy[sample.codes]
+        return _Ready(table, sample, moments, supports, weights, costs)
 
     def _rules(self, ready: _Ready) -> tuple[TrainingRows, SplitRules]:
         """Return the rows as the search for splits needs them, and its rules."""

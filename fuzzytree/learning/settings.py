@@ -9,6 +9,8 @@ from typing import Literal
 
 import msgspec
 
+ClassWeight = Mapping[str, float] | Literal["balanced"] | None
+
 
 class LearningSettings(
     msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
@@ -71,7 +73,7 @@ class LearningSettings(
     points: int = 3
     separate_sides: bool = False
     costs: Mapping[str, float] = {}
-    class_weight: Mapping[str, float] | Literal["balanced"] | None = None
+    class_weight: ClassWeight = None
     rows_per_class: int = 5_000
     seed: int = 0
     missing: Literal["learn", "drop", "refuse"] = "learn"

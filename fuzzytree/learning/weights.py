@@ -9,12 +9,13 @@ weight says when rounded, once at least, and each time with an equal share of it
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.units import FloatArray, IntArray
+from fuzzytree.learning.settings import ClassWeight
+from fuzzytree.learning.units import FloatArray, IntArray, tallied
 
 MOST_COPIES = 1 << 24
 """Whole weights that add up to more count by their ratios."""
@@ -67,3 +68,29 @@ def row_weights(values: FloatArray) -> RowWeights:
     relative = np.where(is_kept, np.maximum(scaled / mean, _SMALLEST), 0.0)
     copies = np.where(is_kept, np.maximum(np.rint(relative), 1.0), 0.0)
     return RowWeights(copies.astype(np.int64), relative / np.maximum(copies, 1.0))
+
+
+def class_weights(
+    wanted: ClassWeight, classes: Sequence[str], codes: IntArray, weights: FloatArray
+) -> FloatArray:
+    """Return by what the weights of each class are multiplied.
+
+    Args:
+        wanted: As in `fuzzytree.learning.LearningSettings`.
+        classes: Their names.
+        codes: The class of each row.
+        weights: Of the rows.
+
+    Example:
+        >>> codes = np.array([0, 0, 0, 1])
+        >>> class_weights("balanced", ["a", "b"], codes, np.ones(4)).round(2).tolist()
+        [0.67, 2.0]
+        >>> class_weights({"b": 3.0}, ["a", "b"], codes, np.ones(4)).tolist()
+        [1.0, 3.0]
+    """
+    if wanted == "balanced":
+        totals = tallied(codes, weights, len(classes))
+        shares = np.where(totals > 0, totals, np.inf) / totals.sum()
+        balanced: FloatArray = 1.0 / (np.count_nonzero(totals) * shares)
+        return balanced
+    return np.array([(wanted or {}).get(name, 1.0) for name in classes], np.float64)

@@ -74,7 +74,7 @@ def test_patterns_of_a_class_that_a_fold_lacks_are_no_error() -> None:
 
 def test_the_majority_is_the_share_of_the_most_common_class() -> None:
     table = read_table(np.arange(8.0)[:, None], target=[*"aabbbbcb"])
-    assert majority(table) == 5 / 8
+    assert majority(table, LearningSettings()) == 5 / 8
 
 
 def test_too_few_rows_are_not_tested() -> None:

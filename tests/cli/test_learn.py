@@ -308,12 +308,14 @@ def test_a_column_of_weights_counts_in_the_tree_and_in_the_test(call: Call) -> N
     lines = [f"{k},{k % 3},{'soft' if k < 40 else 'firm'}" for k in range(90)]
     Path("heavy.csv").write_text("\n".join(["a,w,grip", *lines]), "utf-8")
     words = ("learn", "heavy.csv", "--target", "grip", "--weight", "w")
-    words = (*words, "--class-weight", "balanced", "-o", "heavy.yaml")
-    code, out, err = call(*words, "--json")
+    more = ("--class-weight", "balanced", "-o", "heavy.yaml", "--json")
+    code, out, err = call(*words, *more)
     assert code == 0
     assert "2 classes (30 rows of weight 0 left out)" in err
-    assert "majority class 0.567" in err  # 51 of 90
+    assert "(by the weights of classes; majority class 0.500; " in err
     assert json.loads(out)["rows_without_weight"] == 30
+    _, _, err = call(*words, "-o", "heavy.yaml")
+    assert "majority class 0.567" in err  # 51 of 90
     tree = ft.load("heavy.yaml")
     assert isinstance(tree, FuzzyTree)
     assert tree.columns == ("a",)
