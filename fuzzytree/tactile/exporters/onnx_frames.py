@@ -199,6 +199,9 @@ def _fill(
     is_pressed = sheet.node("Less", zero, pressed, hint="is_pressed")
     if features:
         _side_by_side(sheet, features)
+    elif "features" in outputs:  # a model that looks at nothing
+        none = sheet.numbers([], "none")
+        sheet.node("Gather", sheet.source, none, axis=1, named="features")
     needed = [name for name in outputs if name != "features"]
     if not needed:
         return
