@@ -12,6 +12,7 @@ from fuzzytree.learning.units import FloatArray, IntArray, tallied
 DIGITS = 9
 """Scores are rounded to so many, so that equal ones are equal on every machine."""
 
+_FEW_CLASSES = 7
 _PLACES = 512
 _CELLS = 1 << 18
 
@@ -71,9 +72,19 @@ def information(counts: FloatArray) -> FloatArray:
     Args:
         counts: The weight of each class in each group, shape (..., classes).
     """
-    sizes = counts.sum(axis=-1)
-    found: FloatArray = _own(counts).sum(axis=-1) - _own(sizes)
+    sizes = _over_classes(counts)
+    found: FloatArray = _over_classes(_own(counts)) - _own(sizes)
     return found
+
+
+def _over_classes(numbers: FloatArray) -> FloatArray:
+    """Return the sum over the last axis, of few classes one after another: faster."""
+    if numbers.shape[-1] > _FEW_CLASSES:
+        return np.asarray(numbers.sum(axis=-1), np.float64)
+    total = numbers[..., 0].copy()
+    for code in range(1, numbers.shape[-1]):
+        total += numbers[..., code]
+    return np.asarray(total, np.float64)
 
 
 def _own(numbers: FloatArray) -> FloatArray:

@@ -289,18 +289,24 @@ def _looked_ahead(
     scores = np.full(len(rows.searched), -np.inf)
     found, owners = _bin_scores(node, rules.min_rows)
     np.maximum.at(scores, owners, found)
-    columns = np.argsort(-scores, kind="stable")[:_LOOK_COLUMNS]
-    coarse = {int(c): _coarse(node, int(c)) for c in np.sort(columns)}
-    usable = [c for c, (_, ends) in coarse.items() if len(ends) > 1]
+    columns = np.sort(np.argsort(-scores, kind="stable")[:_LOOK_COLUMNS]).tolist()
+    coarse = [(column, *_coarse(node, column)) for column in columns]
+    coarse = [one for one in coarse if len(one[2]) > 1]
     best, place = -np.inf, (0, 0.0)
-    for number, one in enumerate(usable):
-        for other in usable[number + 1 :]:
-            counts = _joint(node, coarse[one][0], coarse[other][0])
-            for first, table in ((one, counts), (other, counts.transpose(1, 0, 2))):
-                found = _best_of_two(table)
-                k = int(found.argmax())
-                if found[k] > best:
-                    best, place = float(found[k]), (first, float(coarse[first][1][k]))
+    for number in range(len(coarse) - 1):
+        here, others = coarse[number], coarse[number + 1 :]
+        counts = _joint(node, here[1], np.stack([bins for _, bins, _ in others]))
+        found = np.stack(
+            [_best_of_two(counts), _best_of_two(counts.transpose(0, 2, 1, 3))], axis=1
+        )
+        firsts = [(here, other) for other in others]
+        for pair, both in zip(found, firsts, strict=True):
+            for scored, (_, _, ends) in zip(pair, both, strict=True):
+                scored[len(ends) - 1 :] = -np.inf
+        pair, turn, k = np.unravel_index(int(found.argmax()), found.shape)
+        if found[pair, turn, k] > best:
+            column, _, ends = firsts[pair][turn]
+            best, place = float(found[pair, turn, k]), (column, float(ends[k]))
     if entropy + best - 2 * _LOOK_PRICE <= 2 * gain + _LOOK_PRICE:
         return None
     column = int(rows.searched[place[0]])
@@ -321,18 +327,38 @@ def _coarse(node: Chosen, place: int) -> tuple[IntArray, FloatArray]:
     return np.searchsorted(ends, values), ends
 
 
-def _joint(node: Chosen, one: IntArray, other: IntArray) -> FloatArray:
-    wide = int(other.max()) + 1
-    counts = _counts(node, one * wide + other, (int(one.max()) + 1) * wide)
-    return counts.reshape(-1, wide, node.classes)
+def _joint(node: Chosen, one: IntArray, others: IntArray) -> FloatArray:
+    """Return the weight of each class in the bins of a column and each other one.
+
+    Args:
+        node: The rows.
+        one: The bin of each row.
+        others: The same for each other column, shape (others, rows).
+
+    Returns:
+        Shape (others, places, places, classes).
+    """
+    pairs = np.arange(len(others))[:, None]
+    cells = (pairs * _LOOK_PLACES + one) * _LOOK_PLACES + others
+    cells = (cells * node.classes + node.codes).ravel()
+    size = len(others) * _LOOK_PLACES**2 * node.classes
+    counts = tallied(cells, np.tile(node.weights, len(others)), size)
+    return counts.reshape(-1, _LOOK_PLACES, _LOOK_PLACES, node.classes)
 
 
 def _best_of_two(counts: FloatArray) -> FloatArray:
-    """Return the best information after a cut behind each bin of the first axis."""
-    below = np.cumsum(counts, axis=0)
-    result = np.zeros(len(counts) - 1)
-    for half in (below[:-1], below[-1] - below[:-1]):
-        left = np.cumsum(half, axis=1)
-        right = np.maximum(left[:, -1:] - left, 0.0)
-        result += (information(left) + information(right)).max(axis=1)
+    """Return the best information after a cut behind each bin of the first column.
+
+    Args:
+        counts: As `_joint` returns them.
+
+    Returns:
+        Shape (others, places - 1).
+    """
+    below = np.cumsum(counts, axis=1)
+    result = np.zeros((len(counts), _LOOK_PLACES - 1))
+    for half in (below[:, :-1], below[:, -1:] - below[:, :-1]):
+        left = np.cumsum(half, axis=2)
+        right = np.maximum(left[:, :, -1:] - left, 0.0)
+        result += (information(left) + information(right)).max(axis=2)
     return np.round(result, DIGITS)
