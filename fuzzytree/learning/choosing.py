@@ -20,21 +20,21 @@ from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.sampling import hashed
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.splitting import Style
-from fuzzytree.learning.units import FloatArray, IntArray
+from fuzzytree.learning.units import FloatArray, IntArray, tallied
 
 _FOLDS = 5
-_REPEATS = 4
-_FEW_ROWS = 1_000
+_REPEATS = 2
+_FEW_ROWS = 600
 _FEW_CELLS = 20_000
-_FEW_FOLDS = 2
 _FEWEST = 20
 _ROWS = 4_000
 _CELLS = 250_000
 _MANY_CLASSES = 100
-_MOST_CLASSES = 1_000
+_COST_OF_MANY = 2.0  # of a leaf, where there are too many classes to hold rows out
 _SLACK = 0.5
 _STEPS_BACK = 3  # from the largest cost that is good enough: to half of it
 _SURE = 0.5
+_FURTHER_ROWS = 2.0 ** np.arange(-1, 9)
 _COINCIDENCES = 0.02  # equal pairs for each distinct row, from which on they are many
 
 Progress = Callable[[str, float], None]
@@ -48,11 +48,13 @@ class ChosenTree:
         tree: Pruned and refined.
         style: What splits its nodes.
         accuracy: Share of right answers among the rows held out; None without such.
+        further_rows: See `_Trial`.
     """
 
     tree: BinaryTree
     style: Style
     accuracy: float | None
+    further_rows: float
 
 
 def chosen_tree(
@@ -81,7 +83,7 @@ def chosen_tree(
     tree = _pruned(tree, settings, best.cost)
     if best.refines:
         tree = refined(tree, rows, at)
-    return ChosenTree(tree, best.style, best.accuracy)
+    return ChosenTree(tree, best.style, best.accuracy, best.further_rows)
 
 
 def _styles(rows: TrainingRows, rules: SplitRules) -> list[Style]:
@@ -90,7 +92,7 @@ def _styles(rows: TrainingRows, rules: SplitRules) -> list[Style]:
     classes = len(np.unique(rows.codes))
     if not has_combinations:
         return ["columns"]
-    if classes > _MOST_CLASSES:
+    if classes > _MANY_CLASSES:
         return ["centres"]
     return ["columns", "mixed"] if classes < 3 else ["columns", "mixed", "centres"]
 
@@ -114,9 +116,8 @@ def folds_of_rows(rows: TrainingRows, seed: int, *, repeats: int) -> list[Fold]:
         repeats: How often few rows are divided, each time in another way.
     """
     classes = len(np.unique(rows.codes))
-    if classes > _MOST_CLASSES or rows.size < _FEWEST:
+    if classes > _MANY_CLASSES or rows.size < _FEWEST:
         return []
-    number = _FOLDS if classes <= _MANY_CLASSES else _FEW_FOLDS
     width = max(1, len(rows.searched))
     most = max(400, 4 * classes, min(_ROWS, _CELLS // width))
     few = min(_FEW_ROWS // rows.size, _FEW_CELLS // (rows.size * width))
@@ -131,8 +132,8 @@ def folds_of_rows(rows: TrainingRows, seed: int, *, repeats: int) -> list[Fold]:
             kept = np.sort(order[:most])
         order = order[np.isin(order, kept)]
         order = order[np.argsort(rows.codes[order], kind="stable")]
-        turn = np.cumsum(np.diff(owners[order], prepend=owners[order[0]]) != 0) % number
-        folds += [Fold(order[turn != k], order[turn == k]) for k in range(number)]
+        turn = np.cumsum(np.diff(owners[order], prepend=owners[order[0]]) != 0) % _FOLDS
+        folds += [Fold(order[turn != k], order[turn == k]) for k in range(_FOLDS)]
     return folds
 
 
@@ -166,6 +167,8 @@ class _Trial:
         cost: Of a leaf, in rows.
         right: How often each row is answered rightly when it is left out.
         weights: Of the rows; 0 for those that never are.
+        further_rows: How many rows that belong to all classes evenly are added to the
+            leaves, for the frequencies of classes to make the rows left out likeliest.
     """
 
     style: Style
@@ -173,6 +176,7 @@ class _Trial:
     cost: float
     right: FloatArray
     weights: FloatArray
+    further_rows: float = 2.0
 
     @property
     def accuracy(self) -> float | None:
@@ -196,7 +200,8 @@ def _tried(
 ) -> list[_Trial]:
     """Grow a tree for each fold, and find the cost that prunes them best."""
     if not folds:
-        return [_Trial(style, False, 0.0, np.zeros(0), np.zeros(0))]
+        cost = _COST_OF_MANY if len(np.unique(rows.codes)) > _MANY_CLASSES else 0.0
+        return [_Trial(style, False, cost, np.zeros(0), np.zeros(0))]
     right, total = np.zeros(len(COSTS)), 0.0
     trees: list[BinaryTree] = []
     for fold in folds:
@@ -220,14 +225,36 @@ def _tried(
                 for tree, fold in zip(ready, folds, strict=True)
             ]
         right, weights = np.zeros(rows.size), np.zeros(rows.size)
+        losses = np.zeros(len(_FURTHER_ROWS))
         for tree, fold in zip(ready, folds, strict=True):
             given = tree.answers(rows, fold.left_out)
             right[fold.left_out] += given == rows.codes[fold.left_out]
             weights[fold.left_out] += 1.0
+            losses += _log_losses(tree, rows, fold)
         right /= np.maximum(weights, 1.0)
         weights = np.where(weights > 0, rows.weights, 0.0)
-        found.append(_Trial(style, refines, cost, right, weights))
+        further_rows = float(_FURTHER_ROWS[int(np.round(losses, 6).argmin())])
+        found.append(_Trial(style, refines, cost, right, weights, further_rows))
     return found
+
+
+def _log_losses(tree: BinaryTree, rows: TrainingRows, fold: Fold) -> FloatArray:
+    """Return the log-loss of the rows left out, by the number of further rows.
+
+    The chances of a row are the frequencies of the classes in its leaf.
+    """
+    learnt = tree.reaching(rows, fold.learnt)
+    losses = np.zeros(len(_FURTHER_ROWS))
+    for node, inside in tree.reaching(rows, fold.left_out).items():
+        if tree.splits[node] is None:
+            own = learnt[node]
+            counts = tallied(rows.codes[own], rows.weights[own], rows.classes)
+            of_class = (
+                counts[rows.codes[inside]][:, None] + _FURTHER_ROWS / rows.classes
+            )
+            chances = of_class / (counts.sum() + _FURTHER_ROWS)
+            losses -= rows.weights[inside] @ np.log(chances)
+    return losses
 
 
 def _right_by_cost(tree: BinaryTree, rows: TrainingRows, at: IntArray) -> FloatArray:

@@ -249,7 +249,7 @@ class ArrayLearner:
             sample,
             ready.weights,
             places,
-            accuracy=grown.facts.get("inner_accuracy"),
+            further_rows=grown.further_rows,
         )
         if self.settings.mode != "paper":
             tree = described(tree, self.columns, ready.table, self.statistics)
@@ -349,7 +349,9 @@ class ArrayLearner:
             "chosen": {"splits": _STYLES[choice.style]},
             "inner_accuracy": choice.accuracy,
         }
-        return _Grown(found.sketch, found.patterns, supports, facts)
+        return _Grown(
+            found.sketch, found.patterns, supports, facts, choice.further_rows
+        )
 
     def _report(
         self, moments: Moments, sample: Sample, grown: _Grown, made: AssembledTree
@@ -414,12 +416,16 @@ class _Ready:
 
 @dataclass(frozen=True)
 class _Grown:
-    """A tree over patterns, the rows that each leaf stands for, and what to report."""
+    """A tree over patterns, the rows that each leaf stands for, and what to report.
+
+    `further_rows` is what `with_probabilities` needs to know.
+    """
 
     sketch: Sketch
     patterns: Patterns
     supports: FloatArray
     facts: dict[str, Any]
+    further_rows: float = 2.0
 
 
 _MIN_ROWS = 3

@@ -6,9 +6,8 @@ likely, found by expectation maximisation from the frequencies of the leaves, wi
 further rows at each leaf that belong to all classes evenly. The sharpness is the one
 with the smallest log-loss where each row is left out of the vectors that rate it.
 
-The tree was grown on these rows, so it is right about more of them than about others.
-Of 1, 2, 4, ... further rows there are as many as bring the mean probability of the
-predicted class nearest to the share of held-out rows about which trees were right.
+The tree was grown on these rows, so its leaves rate others less well than these: how
+many further rows there are, rows that were held out decide (`choosing`).
 """
 
 from __future__ import annotations
@@ -35,8 +34,6 @@ from fuzzytree.model import (
 )
 
 _TRIED = (1, 2, 4, 8, 16, 32, 128, 1024)
-_EVEN_ROWS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
-_FEW_EVEN_ROWS = 2.0  # without held-out rows
 _STEPS = 10
 _MOST_TO_CHOOSE = 1 << 18  # leaves times rows, to choose the sharpness by
 _MOST_TO_FIT = 1 << 21
@@ -48,7 +45,7 @@ def with_probabilities(
     weights: FloatArray,
     columns: dict[str, int],
     *,
-    accuracy: float | None = None,
+    further_rows: float = 2.0,
 ) -> FuzzyTree:
     """Return a tree whose leaves have probabilities.
 
@@ -59,18 +56,19 @@ def with_probabilities(
         sample: Rows of the table, ordered by class.
         weights: How many rows of the table each row stands for, by its weight.
         columns: The position of each column in the rows.
-        accuracy: The share of held-out rows about which trees were right, if known.
+        further_rows: How many rows at each leaf belong to all classes evenly.
     """
     leaves, classes = len(tree.leaves), len(tree.classes)
     if leaves > MOST_MIXED or leaves * classes > MOST_PROBABILITIES:
         return tree
     few = _thinned(sample, _MOST_TO_CHOOSE // leaves)
     rows = _rated(tree, sample, few, weights, columns)
-    sharpness, even = _chosen(rows, accuracy)
+    fits = [(_fitted(rows, one, further_rows)[1], one) for one in _TRIED]
+    sharpness = min(fits)[1]
     many = _thinned(sample, _MOST_TO_FIT // leaves)
     if len(many) > len(few):
         rows = _rated(tree, sample, many, weights, columns)
-    vectors = _in_parts(_fitted(rows, sharpness, even).vectors)
+    vectors = _in_parts(_fitted(rows, sharpness, further_rows)[0])
     semantics = msgspec.structs.replace(tree.semantics, sharpness=sharpness)
     ends = tuple(
         msgspec.structs.replace(leaf, probabilities=tuple(vector))
@@ -87,42 +85,12 @@ class _Rows(msgspec.Struct, frozen=True):
         codes: The class of each row, in ascending order.
         weights: How many rows of the table each row stands for.
         classes: How many there are.
-        predicted: The predicted class of each row.
     """
 
     strengths: FloatArray
     codes: IntArray
     weights: FloatArray
     classes: int
-    predicted: IntArray
-
-
-class _Fit(msgspec.Struct, frozen=True):
-    """The probabilities of the leaves, and how they rate the rows.
-
-    Attributes:
-        vectors: Shape (leaves, classes).
-        loss: The log-loss, each row left out of the vectors that rate it.
-        confidence: The mean probability of the predicted class.
-    """
-
-    vectors: FloatArray
-    loss: float
-    confidence: float
-
-
-def _chosen(rows: _Rows, accuracy: float | None) -> tuple[int, float]:
-    """Return the sharpness, and how many further rows each leaf has."""
-    chosen, least = (_TRIED[0], _FEW_EVEN_ROWS), np.inf
-    for even in (_FEW_EVEN_ROWS,) if accuracy is None else _EVEN_ROWS:
-        fits = [_fitted(rows, sharpness, even) for sharpness in _TRIED]
-        best = min(range(len(fits)), key=lambda place: fits[place].loss)
-        apart = fits[best].confidence - (accuracy or 0.0)
-        if abs(apart) < least:
-            chosen, least = (_TRIED[best], even), abs(apart)
-        if apart <= 0.0:
-            break
-    return chosen
 
 
 def _thinned(sample: Sample, most: int) -> IntArray:
@@ -150,10 +118,7 @@ def _rated(
         thinning = np.bincount(sample.codes) / np.maximum(np.bincount(codes), 1)
         weights = weights[places] * thinning[codes]
     strengths = leaf_strengths(tree, sample.rows[places].T, columns)
-    places_of = {name: code for code, name in enumerate(tree.classes)}
-    owners = np.array([places_of[leaf.label] for leaf in tree.leaves], np.int64)
-    predicted = owners[strengths.argmax(axis=0)]
-    return _Rows(strengths, codes, weights, len(tree.classes), predicted)
+    return _Rows(strengths, codes, weights, len(tree.classes))
 
 
 def leaf_strengths(
@@ -219,8 +184,13 @@ def _degrees(band: Band, axis: FloatArray) -> FloatArray:
     return degrees
 
 
-def _fitted(rows: _Rows, sharpness: int, even: float) -> _Fit:
-    """Return the likeliest vectors of the leaves, given the further rows of each."""
+def _fitted(rows: _Rows, sharpness: int, even: float) -> tuple[FloatArray, float]:
+    """Return the likeliest vectors of the leaves, given the further rows of each.
+
+    Returns:
+        The vectors, shape (leaves, classes), and the log-loss of the rows, each left
+        out of the vectors that rate it.
+    """
     powers = rows.strengths
     for _ in range(squarings(sharpness)):
         powers = powers * powers
@@ -234,9 +204,7 @@ def _fitted(rows: _Rows, sharpness: int, even: float) -> _Fit:
     left_out = (likely - shares) / (totals - shares)
     chances = (powers * left_out).sum(axis=0) / powers.sum(axis=0)
     loss = -(rows.weights * np.log(chances)).sum() / rows.weights.sum()
-    whole = rows.weights / powers.sum(axis=0) / rows.weights.sum()
-    rated = (powers * vectors[:, rows.predicted]).sum(axis=0)
-    return _Fit(vectors, float(loss), float((rated * whole).sum()))
+    return vectors, float(loss)
 
 
 def _vectors(
