@@ -30,6 +30,8 @@ _MOST_PAIRS = 40
 _FEWEST_PAIRS = 4
 _PAIRS_BY_CLASSES = 20_000  # pairs times all classes of a table
 _KEPT_STARTS = 10
+_FEWEST_STARTS = 2
+_STARTS_BY_CLASSES = 1_000
 _RIDGE = 0.01
 _STRAY = 0.2  # share of a class; what is less came to a node by chance
 _FEW_COLUMNS = 16
@@ -88,7 +90,9 @@ def parted_clouds(
     middle = sizes @ means / sizes.sum()
     places = (means - middle) @ white
     pairs = max(_FEWEST_PAIRS, min(_MOST_PAIRS, _PAIRS_BY_CLASSES // len(whole.sizes)))
-    found = _best_groups(places[counts], sizes[counts], pairs)
+    starts = _STARTS_BY_CLASSES // len(whole.sizes)
+    starts = max(_FEWEST_STARTS, min(_KEPT_STARTS, starts))
+    found = _best_groups(places[counts], sizes[counts], pairs, starts)
     if found is None:
         return None
     axis, groups = found
@@ -115,7 +119,7 @@ def parted_clouds(
 
 
 def _best_groups(
-    places: FloatArray, sizes: FloatArray, pairs: int
+    places: FloatArray, sizes: FloatArray, pairs: int, starts: int
 ) -> tuple[FloatArray, BoolArray] | None:
     """Return the axis on which a cut parts clouds of spread 1 best, and the groups."""
     basis = _span(places, sizes)
@@ -129,7 +133,7 @@ def _best_groups(
             tried.append((loss, groups, start))
     best, lowest = None, np.inf
     seen: set[bytes] = set()
-    for loss, groups, start in sorted(tried, key=lambda one: one[0])[:_KEPT_STARTS]:
+    for loss, groups, start in sorted(tried, key=lambda one: one[0])[:starts]:
         axis, is_known = start, False
         for _ in range(_ROUNDS):
             if loss < lowest:
