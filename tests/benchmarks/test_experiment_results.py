@@ -27,16 +27,16 @@ def is_within(study: Study, stated: float) -> bool:
 @pytest.mark.parametrize(
     ("name", "features", "settings", "stated", "floor"),
     [
-        ("postures", "log paper", LearningSettings(), 0.689, 0.6),
+        ("postures", "log paper", LearningSettings(), 0.670, 0.6),
         (
             "postures",
             "log orientation",
             LearningSettings(),
-            0.789,
+            0.787,
             0.7,
         ),
-        ("postures-17", None, None, 0.792, 0.6),
-        ("touch", None, None, 0.852, 0.8),
+        ("postures-17", None, None, 0.811, 0.6),
+        ("touch", None, None, 0.859, 0.8),
     ],
 )
 def test_people_who_were_left_out_are_recognised(
@@ -52,14 +52,15 @@ def test_people_who_were_left_out_are_recognised(
     assert study.accuracy > floor
 
 
-def test_the_tree_is_no_worse_than_chance_allows_beside_a_forest() -> None:
+def test_three_postures_are_recognised_as_the_page_states_beside_others() -> None:
     pytest.importorskip("sklearn")
     study = experiment(known_task("postures"), peers=["random forest", "LDA"]).study
-    assert is_within(study, 0.970), study.accuracy
+    assert is_within(study, 0.914), study.accuracy
     forest, lda = study.peers
-    assert forest.pairing.chance > 0.05
+    assert forest.pairing.worse > forest.pairing.better
+    assert forest.pairing.chance < 0.01
     assert lda.pairing.better > lda.pairing.worse
-    assert lda.pairing.chance < 0.01
+    assert lda.pairing.chance > 0.05
 
 
 def test_what_is_mistaken_on_the_simulated_sensor_is_the_angle() -> None:
@@ -82,7 +83,7 @@ def test_on_an_even_sensor_invariants_distinguish_shapes_and_few_angles() -> Non
     plain = experiment(task).study
     assert 4 / 7 - 0.05 < plain.accuracy < 0.75  # 4 / 7: shapes, and no angle
     scaled = experiment(task, features="log paper / force").study
-    assert is_within(scaled, 0.816), scaled.accuracy
+    assert is_within(scaled, 0.846), scaled.accuracy
     assert scaled.accuracy > plain.accuracy + 0.05
 
 
