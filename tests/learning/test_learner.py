@@ -285,6 +285,31 @@ def test_columns_that_do_not_matter_do_not_matter(
     assert found.report.leaves <= 12
 
 
+def test_leaves_are_as_sure_as_rows_that_were_held_out_allow() -> None:
+    rng = np.random.default_rng(8)
+    values = rng.uniform(size=(400, 3))
+    clear = (values[:, 0] > 0.5).astype(np.int64)
+    flipped = np.where(rng.uniform(size=400) < 0.3, 1 - clear, clear)
+    sure: list[float] = []
+    for labels in (clear, flipped):
+        tree = learn(values, labels).tree
+        largest = [max(leaf.probabilities or (0.0,)) for leaf in tree.leaves]
+        supports = [leaf.support or 0 for leaf in tree.leaves]
+        sure.append(float(np.average(largest, weights=supports)))
+    assert sure[0] > 0.99
+    assert 0.6 < sure[1] < 0.8
+
+
+def test_many_classes_are_divided_as_clouds() -> None:
+    rng = np.random.default_rng(3)
+    centres = 4.6 * rng.normal(size=(120, 6))
+    labels, fresh = np.repeat(np.arange(120), 20), np.repeat(np.arange(120), 10)
+    values = centres[labels] + rng.normal(size=(len(labels), 6))
+    others = centres[fresh] + rng.normal(size=(len(fresh), 6))
+    found = learn(values, labels)
+    assert accuracy(found.tree, others, fresh) > 0.9
+
+
 def test_patterns_can_be_given_by_class() -> None:
     values, labels = blobs()
     found = learn(
