@@ -24,7 +24,7 @@ from fuzzytree.learning.units import FloatArray, IntArray, tallied
 
 _FOLDS = 5
 _REPEATS = 2
-_FEW_ROWS = 600
+_FEW_ROWS = 1_000
 _FEW_CELLS = 20_000
 _FEWEST = 20
 _ROWS = 4_000

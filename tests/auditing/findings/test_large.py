@@ -27,11 +27,11 @@ LARGE: dict[str, RuleBase] = {
 }
 
 
-def queries(name: str) -> tuple[Audit, float]:
+def queries(name: str, budget_s: float = BUDGET_S) -> tuple[Audit, float]:
     """Return an audit of a large model, and what it took of the processor."""
-    clock = Clock(BUDGET_S, now=time.process_time)
+    clock = Clock(budget_s, now=time.process_time)
     start = time.process_time()
-    settings = AuditSettings(budget_s=BUDGET_S)
+    settings = AuditSettings(budget_s=budget_s)
     found = audit(
         Material(LARGE[name]),
         domain=unit_domain(LARGE[name]),
@@ -58,6 +58,6 @@ def test_an_audit_of_a_large_model_keeps_its_budget(name: str) -> None:
 @pytest.mark.heavy
 @pytest.mark.parametrize("name", ["500 x 2", "500 x 2, product", "60 classes"])
 def test_most_rules_of_a_large_model_are_seen_to_win(name: str) -> None:
-    found, _ = queries(name)
+    found, _ = queries(name, 5 * BUDGET_S)  # what slow machines need, too
     won = [one for one in found.answers if one.code == "FT101"]
     assert sum(isinstance(one.state, Witness) for one in won) > 20
