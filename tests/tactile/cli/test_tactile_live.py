@@ -224,7 +224,7 @@ def test_a_port_that_is_not_there_is_reported(call: Call) -> None:
 def test_a_board_is_answered_through_faults_and_a_pulled_plug(call: Call) -> None:
     # Nothing comes back, for a busy computer may miss the first of it.
     cycle = [*[SMALL] * 40, *[LARGE] * 40, *[NOTHING] * 20]
-    shown = [NOTHING] * 30 + cycle * 5
+    shown = itertools.chain([NOTHING] * 30, itertools.cycle(cycle))
     faults = ConnectionFaults(flip=0.002, unplug=Pause(0.1, every=150))
     with FaultyDevice(BOARD, shown, faults, rate=2.0, seed=1) as device:
         words = (device.port, "--board", "mat.yaml", "--model", "area.yaml")
