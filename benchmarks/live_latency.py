@@ -34,7 +34,6 @@ from fuzzytree.tactile.cli.screen import Screen
 from fuzzytree.tactile.link import open_connection
 from fuzzytree.tactile.recognition.frame_sources import PAPER_BOARD, simulated
 from fuzzytree.tactile.recognition.live import Live
-from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.simulation.device import Wire
 from fuzzytree.tactile.simulation.encoding import encoded
@@ -101,7 +100,7 @@ def latencies(
         while not Path(link).exists():
             time.sleep(0.01)
         line = open_connection(board, link, most_waiting=MOST_WAITING)
-        live = Live(Recogniser(tree, board.sensor), line, "board")
+        live = Live(tree, board.sensor, line, "board")
         late = np.full(count, np.nan)
         with contextlib.ExitStack() as stack:
             stack.callback(line.close)

@@ -42,3 +42,4 @@ from .tables import table as table
 
 __all__: list[str]
 __version__: str
+from . import tactile as tactile

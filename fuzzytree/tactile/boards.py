@@ -169,11 +169,16 @@ class Start(Value, FileRecord, frozen=True):
         frames: How many frames make the baseline (their median, cell by cell); 0 for
             none.
         hot: A cell whose baseline is above this share of full is masked.
+        follow_s: Seconds in which the baseline of a free cell follows 63 % of a
+            change; 0 for a baseline that stays as it was measured.
     """
 
     noun: ClassVar[str] = "a start"
     frames: StartFrames = 30
     hot: Share = 0.5
+    follow_s: Annotated[float, Meta(ge=0.0, le=86400.0)] = field(
+        name="follow", default=30.0
+    )
 
 
 class Board(Value, frozen=True):

@@ -38,7 +38,7 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=left_out)
     shutil.copy(ROOT / "pyproject.toml", folder)
     shutil.copy(ROOT / "README.md", folder)
-    for name in (*TABLES, "pyproject.toml"):
+    for name in (*TABLES, "fuzzytree/__init__.pyi", "pyproject.toml"):
         path = folder / name
         lines = path.read_text("utf-8").splitlines(keepends=True)
         path.write_text("".join(one for one in lines if "tactile" not in one), "utf-8")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator
-from pathlib import Path
+from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING
 
 import click
@@ -25,15 +24,8 @@ from fuzzytree.cli import (
 from fuzzytree.tactile.cli.sensors import frames_model
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.boards import Board
-    from fuzzytree.tactile.link import Connection
-    from fuzzytree.tactile.recognition.live import FrameSource, Live, LiveResult
-    from fuzzytree.tactile.sensor import Frame
+    from fuzzytree.tactile.recognition.live import Live, LiveResult
 
-SIMULATOR = "simulator"
-MOST_WAITING = 4
-"""Frames that wait for an answer before older ones are dropped: the newest count."""
-_PATIENCE_S = 2.0  # for a first frame
 SWITCH_S = 2e-4
 """How soon a thread that reads or draws gives way to an answer."""
 
@@ -57,6 +49,18 @@ class TactileLiveOptions:
         "Frames that a result must last before its line is printed.",
         type=click.IntRange(1),
         default=3,
+    )
+    vote: float = option(
+        "--vote SECONDS",
+        "How long the answers to an object vote; 0 for each frame's own.",
+        type=click.FloatRange(0.0, 60.0),
+        default=0.0,
+    )
+    area: int = option(
+        "--area CELLS",
+        "Fewest cells of an object; smaller regions are counted and left out.",
+        type=click.IntRange(1),
+        default=2,
     )
     lines: bool = flag("--lines", "Print lines, also on a terminal.")
     as_json: bool = flag("--json", "Print each line as JSON.")
@@ -95,37 +99,44 @@ class TactileLiveOptions:
 @click.command("live", short_help="Recognise what lies on a sensor, on-line.")
 @takes(TactileLiveOptions)
 def command(options: TactileLiveOptions) -> int:
-    """Recognise the object on the sensor, frame by frame.
+    """Recognise the objects on the sensor, frame by frame.
 
     SOURCE is a serial port, a recording, or `simulator`: the paper's objects one after
-    another. A terminal shows a picture, the class and the strengths; elsewhere there
-    is a line for each object that is newly recognised. Ctrl-C ends. Exit 1 if
-    --record ended before.
+    another. A terminal shows a picture, the classes and the strengths, and takes the
+    keys t (tare), s and i; elsewhere there is a line for each object that is newly
+    recognised. Ctrl-C ends. Exit 1 if --record ended before.
     """
-    from fuzzytree.tactile.link.recording import Recorder
-    from fuzzytree.tactile.recognition.frame_sources import Newest, Recorded
-    from fuzzytree.tactile.recognition.live import Live
-    from fuzzytree.tactile.recognition.recogniser import Recogniser, usual_floor
+    from fuzzytree.tactile.recognition.recogniser import usual_floor
+    from fuzzytree.tactile.recognition.sensing import open_sensor
     from fuzzytree.tactile.report.page import LivePage
+
+    def tell(word: str, text: str) -> None:
+        say_rows((word, text, ""), quiet=options.quiet)
 
     known = frames_model(options.model)
     floor = usual_floor(known) if options.reject is None else options.reject
     labels: Counter[str] = Counter()
-    recorded: Recorded | None = None
+    frames = 0
     with contextlib.ExitStack() as stack:
         stack.callback(sys.setswitchinterval, sys.getswitchinterval())
         sys.setswitchinterval(SWITCH_S)
         with wrong_options():
-            found, used = _opened(options)
-            stack.callback(found.close)
-            recogniser = Recogniser(known, used.sensor, floor)
-        if options.record is not None:
-            found = recorded = Recorded(found, Recorder(options.record, used))
-            stack.callback(recorded.end)
-            if options.board is not None:
-                found = Newest(recorded, MOST_WAITING)
-                stack.callback(found.close)
-        live = Live(recogniser, found, options.source)
+            sensor = open_sensor(
+                options.source,
+                model=known,
+                board=options.board,
+                reject=floor,
+                vote_s=options.vote,
+                least_area=options.area,
+                record=options.record,
+                speed=options.speed,
+                seed=options.seed,
+                say=tell,
+            )
+        stack.callback(sensor.close)
+        for remark in sensor.remarks:
+            tell("remark", remark)
+        live = sensor.live
         if options.page is not None:
             page = LivePage(live, options.page, times=options.times)
             url = stack.enter_context(page).url
@@ -134,10 +145,12 @@ def command(options: TactileLiveOptions) -> int:
             with _display(live, options) as write:
                 for answer in live.answers(options.frames):
                     write(answer)
-                    labels[_word(answer)] += 1
+                    labels.update(_words(answer))
+                    frames += 1
         except KeyboardInterrupt:
             pass
-    _report(live, labels, floor, options)
+    _report(live, labels, frames, floor, options)
+    recorded = sensor.recorded
     if recorded is None or options.record is None:
         return 0
     kept = f"{recorded.written} frames"
@@ -147,61 +160,6 @@ def command(options: TactileLiveOptions) -> int:
     return 1 if recorded.failure else 0
 
 
-def _opened(options: TactileLiveOptions) -> tuple[FrameSource, Board]:
-    """Return where frames come from, and the board that they fit."""
-    from fuzzytree.tactile.recognition import frame_sources as sources
-
-    source, board, speed = options.source, options.board, options.speed
-    is_file = Path(source).is_file()
-    if board is not None and (source == SIMULATOR or is_file):
-        raise click.UsageError(f"--board is for a port; {source} has its own")
-    if source == SIMULATOR:
-        frames = sources.simulated(options.seed)
-        return sources.Paced(frames, speed), sources.PAPER_BOARD
-    if is_file:
-        replayed = sources.Replayed(source, speed)
-        return replayed, replayed.board
-    if board is None:
-        raise click.UsageError(
-            f"{source} is no recording; for a port, name its board with --board"
-        )
-    return _line(board, options)
-
-
-def _line(board: str, options: TactileLiveOptions) -> tuple[FrameSource, Board]:
-    """Open a port, and measure what its board reads when nothing presses."""
-    from fuzzytree.tactile import link as lines
-    from fuzzytree.tactile.board_file import load_board
-
-    known, quiet = load_board(board), options.quiet
-    most = MOST_WAITING if options.record is None else lines.room(known)
-    line = lines.open_connection(known, options.source, most_waiting=most)
-    try:
-        count = known.start.frames
-        if count:
-            what = f"the baseline in {count} frames: nothing may lie on the sensor"
-            say_rows(("measures", what, ""), quiet=quiet)
-        found = lines.start(known, _coming(line, quiet=quiet))
-        for remark in found.remarks:
-            say_rows(("remark", remark, ""), quiet=quiet)
-        return line, found.board
-    except BaseException:
-        line.close()
-        raise
-
-
-def _coming(line: Connection, *, quiet: bool) -> Iterator[Frame]:
-    """Give the frames of a line; say once that none comes."""
-    is_late = False
-    while line.state != "ended":
-        frame = line.take(_PATIENCE_S)
-        if frame is not None:
-            yield frame
-        elif not is_late:
-            is_late = True
-            say_rows(("waits", "no frame comes", "Ctrl-C ends"), quiet=quiet)
-
-
 @contextlib.contextmanager
 def _display(
     live: Live, options: TactileLiveOptions
@@ -209,7 +167,7 @@ def _display(
     """Show a picture on a terminal; elsewhere yield what writes new, stable results."""
     from fuzzytree.tactile.cli.screen import Screen, ended_by_signals, look_of
     from fuzzytree.tactile.recognition.live import Hold
-    from fuzzytree.tactile.report.live import line, line_facts, visible
+    from fuzzytree.tactile.report.live import event_text, line_facts, lines, visible
 
     hold, said = Hold(options.hold), [""]
 
@@ -218,10 +176,15 @@ def _display(
         if trouble not in ("", said[-1]):
             said.append(trouble)
             say(visible(trouble))
-        if answer.state is None or not hold((answer.state, answer.code)):
+        for event in answer.events:
+            say(event_text(event), quiet=options.quiet)
+        shown = tuple(sorted((one.number, one.code) for one in answer.objects))
+        if answer.state is None or not hold(shown):
             return
-        facts = line_facts(answer)
-        text = msgspec.json.encode(facts).decode() if options.as_json else line(answer)
+        text = lines(answer)
+        if options.as_json:
+            facts = map(msgspec.json.encode, line_facts(answer))
+            text = "\n".join(one.decode() for one in facts)
         sys.stdout.write(f"{text}\n")
         sys.stdout.flush()
 
@@ -236,14 +199,23 @@ def _display(
         yield lambda _answer: None
 
 
-def _word(answer: LiveResult) -> str:
+def _words(answer: LiveResult) -> list[str]:
+    """Return what is counted of a frame: each object, or that there is none."""
     from fuzzytree.tactile.recognition.live import STATES
 
-    return answer.label or ("refused" if answer.state is None else STATES[answer.state])
+    if answer.state is None:
+        return ["refused"]
+    if not answer.objects:
+        return [STATES[answer.state]]
+    return [one.label or STATES[one.state] for one in answer.objects]
 
 
 def _report(
-    live: Live, labels: Counter[str], reject: float, options: TactileLiveOptions
+    live: Live,
+    labels: Counter[str],
+    frames: int,
+    reject: float,
+    options: TactileLiveOptions,
 ) -> None:
     """Say what was answered, how fast, and what was out of the ordinary."""
     from fuzzytree.tactile.recognition.live import STATES
@@ -254,9 +226,11 @@ def _report(
     found = [f"{visible(label)} {count}" for label, count in sorted(labels.items())]
     unknown = labels[word]
     floor = f"no rule, or one below {reject:g}, decides; --reject sets it"
+    small = f"regions below {options.area} cells, no objects; --area sets it"
     say_rows(
-        ("answered", f"{labels.total()} frames", ", ".join(found)),
+        ("answered", f"{frames} frames", ", ".join(found)),
         *([(word, f"{unknown} frames", floor)] if unknown else []),
+        *([("left out", f"{live.left_out}", small)] if live.left_out else []),
         ("counted", counts(view), ""),
         *([("took", timing(view), "")] if view.latency else []),
         quiet=options.quiet,

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
+import sys
 import threading
 from collections.abc import Generator, Mapping
 from types import FrameType
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from fuzzytree.tactile.cli.signals import Handler, handled
 from fuzzytree.tactile.report.live import Look, screen
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.recognition.live import Live
+
+if sys.platform != "win32":
+    import termios
+
+COUNTS = (3, 5, 7)
+"""Points of the picture for a cell on each side, as a key switches them."""
 
 _REFRESHES = 30  # a second, at most
 _ALIVE_S = 0.5  # between two refreshes where no frames come
@@ -46,12 +54,18 @@ def look_of(
 
 
 class Screen:
-    """Draws in a thread, at most 30 times a second, each time by one write."""
+    """Draws in a thread, at most 30 times a second, each time by one write.
+
+    On a keyboard `t` tares, `s` shows the real cells, and `i` changes the points.
+    """
 
     def __init__(self, live: Live, stream: TextIO, look: Look, times: int) -> None:
         self._live, self._file = live, stream.fileno()
         self._look: Look = look
         self._times = times
+        self._is_smooth = True
+        self._keyboard: int | None = None
+        self._settings: list[Any] = []
         self._stop = threading.Event()
         self._drawing = threading.Lock()
         self._shown: list[str] = []
@@ -60,6 +74,7 @@ class Screen:
 
     def __enter__(self) -> Screen:
         """Take the terminal."""
+        self._listen()
         self._write(_ENTER)
         self._thread.start()
         return self
@@ -70,21 +85,56 @@ class Screen:
         self._thread.join(_JOIN_S)
         with contextlib.suppress(OSError):  # the terminal may be gone
             self._write(_LEAVE)
+        self._listen_no_more()
 
     @contextlib.contextmanager
     def given_back(self) -> Generator[None]:
         """Give the terminal back for a while, and take it again."""
         with self._drawing:
             self._write(_LEAVE)
+            self._listen_no_more()
             yield
+            self._listen()
             self._write(_ENTER)
             self._shown = []
+
+    def _listen(self) -> None:
+        """Take keys as they are pressed, without showing them."""
+        if sys.platform == "win32" or not sys.stdin.isatty():
+            return
+        self._keyboard = sys.stdin.fileno()
+        self._settings = termios.tcgetattr(self._keyboard)
+        new = termios.tcgetattr(self._keyboard)
+        new[3] &= ~(termios.ICANON | termios.ECHO)
+        termios.tcsetattr(self._keyboard, termios.TCSANOW, new)
+
+    def _listen_no_more(self) -> None:
+        if sys.platform != "win32" and self._keyboard is not None:
+            with contextlib.suppress(termios.error):  # the terminal may be gone
+                termios.tcsetattr(self._keyboard, termios.TCSANOW, self._settings)
+            self._keyboard = None
+
+    def _take_keys(self) -> None:
+        if self._keyboard is None or not select.select([self._keyboard], [], [], 0)[0]:
+            return
+        for key in os.read(self._keyboard, 64):
+            match chr(key):
+                case "t":
+                    self._live.tare()
+                case "s":
+                    self._is_smooth = not self._is_smooth
+                case "i":
+                    later = [count for count in COUNTS if count > self._times]
+                    self._times = min(later, default=COUNTS[0])
+                case _:
+                    pass
 
     def _run(self) -> None:
         seen = 0
         with contextlib.suppress(OSError):  # the terminal may be gone
             while not self._stop.is_set():
                 with self._drawing:
+                    self._take_keys()
                     self._draw()
                 self._stop.wait(1 / _REFRESHES)
                 seen = self._live.wait(seen, _ALIVE_S)
@@ -94,7 +144,12 @@ class Screen:
         size = os.get_terminal_size(self._file)
         columns, lines = max(size.columns, 1), max(size.lines, 1)
         view = self._live.view()
-        text = screen(view, columns, lines, look=self._look, times=self._times)
+        times = self._times if self._is_smooth else 1
+        shown = f"{self._times} points a cell" if self._is_smooth else "the real cells"
+        keys = f"t tares, s and i change the picture ({shown}), Ctrl-C ends"
+        if self._keyboard is None:
+            keys = "Ctrl-C ends"
+        text = screen(view, columns, lines, look=self._look, times=times, keys=keys)
         new = text.split("\n")
         parts = ["\x1b[2J"] if size != self._size else []
         before = [] if size != self._size else self._shown

@@ -126,10 +126,6 @@ def frames_model(path: str) -> Model:
         TableError: If the file holds something else.
     """
     from fuzzytree import api
-    from fuzzytree.errors import TableError
-    from fuzzytree.model import FuzzyTree, RuleBase
+    from fuzzytree.tactile.recognition.recogniser import checked_model
 
-    found = api.opened(path)
-    if not isinstance(found, FuzzyTree | RuleBase):
-        raise TableError(f"{path}: a model of frames is a tree or a rule base")
-    return found
+    return checked_model(api.opened(path), path)

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from fuzzytree.errors import TableError
+from fuzzytree.tactile.recognition.objects import (
+    LEAST_AREA,
+    Region,
+    Tracker,
+    regions,
+)
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State
-from fuzzytree.tactile.sensor import Cells, Counters, Frame, pressed
+from fuzzytree.tactile.rest import FOLLOW_S, Rest, RestEvent
+from fuzzytree.tactile.sensor import Counters, Frame, Sensor
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.model import Model
 
 STATES = {state: state.name.lower() for state in State}
 """The word for each state in lines and JSON."""
@@ -55,36 +68,124 @@ class FrameSource(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class SensorObject:
+    """An object on the sensor. Its features are over its own cells, and no others.
+
+    Attributes:
+        number: From 1, in the order in which objects came; it keeps it while it stays.
+        state: `OBJECT`, or `UNKNOWN`.
+        code: The place of the class among the classes; -1 if it is unknown.
+        label: The class; empty if it is unknown.
+        strengths: Of the classes, in [0, 1].
+        region: Its cells, box, area and force.
+        recogniser: What recognised it.
+    """
+
+    number: int
+    state: State
+    code: int
+    label: str
+    strengths: tuple[float, ...]
+    region: Region
+    recogniser: Recogniser
+
+    @property
+    def strength(self) -> float:
+        """The strength of the class; the largest one if it is unknown."""
+        if self.code < 0:
+            return max(self.strengths, default=0.0)
+        return self.strengths[self.code]
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """The first row and column, and those behind the last ones."""
+        return self.region.box
+
+    @property
+    def x(self) -> float:
+        """The centre of pressure, in cells to the right of the sensor's middle."""
+        return self._place[0]
+
+    @property
+    def y(self) -> float:
+        """The centre of pressure, in cells above the sensor's middle."""
+        return self._place[1]
+
+    @property
+    def angle(self) -> float:
+        """Where the longer axis points to, in degrees counterclockwise from x."""
+        return self._place[2]
+
+    @functools.cached_property
+    def probabilities(self) -> tuple[float, ...]:
+        """The probabilities of the classes.
+
+        Empty if the model has none, or no rule fires.
+        """
+        return self.recogniser.probabilities(self.region.cells)
+
+    @functools.cached_property
+    def _place(self) -> tuple[float, float, float]:
+        return self.recogniser.place(self.region.cells)
+
+
 @dataclass(frozen=True, slots=True)
 class LiveResult:
     """What one frame shows.
 
     Attributes:
-        frame: The frame.
-        state: What it shows; None if the frame does not fit.
-        code: The place of the class among the classes; -1 if it shows no object.
-        label: The class; empty if it shows no object.
-        strengths: Of the classes, in [0, 1].
+        frame: As the board sent it.
+        cells: What presses, of shape (rows, columns), without the baseline; None if
+            the frame does not fit.
+        objects: What lies there, the largest force first.
+        left_out: How many regions are too small for an object.
         saturated: How many cells take no more.
         latency_s: From the last byte of the frame to this answer.
         trouble: A sentence about what is wrong with the frame; empty if nothing is.
+        events: What has changed in what cells read at rest.
     """
 
     frame: Frame
-    state: State | None
-    code: int
-    label: str
-    strengths: tuple[float, ...]
+    cells: npt.NDArray[np.int64] | None
+    objects: tuple[SensorObject, ...]
+    left_out: int
     saturated: int
     latency_s: float
     trouble: str
+    events: tuple[RestEvent, ...]
+
+    @property
+    def time(self) -> float:
+        """When the last byte of the frame came, in seconds since the beginning."""
+        return self.frame.time
+
+    @property
+    def state(self) -> State | None:
+        """What the object of the largest force is; None if the frame does not fit."""
+        if self.objects:
+            return self.objects[0].state
+        return None if self.cells is None else State.NOTHING
+
+    @property
+    def code(self) -> int:
+        """The class of the object of the largest force; -1 for none."""
+        return self.objects[0].code if self.objects else -1
+
+    @property
+    def label(self) -> str:
+        """The class of the object of the largest force; empty for none."""
+        return self.objects[0].label if self.objects else ""
+
+    @property
+    def strengths(self) -> tuple[float, ...]:
+        """The strengths of the object of the largest force; empty without one."""
+        return self.objects[0].strengths if self.objects else ()
 
     @property
     def strength(self) -> float:
-        """The strength of the class; the largest one if it shows no object."""
-        if self.code < 0:
-            return max(self.strengths, default=0.0)
-        return self.strengths[self.code]
+        """The strength of the object of the largest force; 0 without one."""
+        return self.objects[0].strength if self.objects else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +212,6 @@ class LiveView:
         model: The name of the model.
         classes: The names of the classes.
         full: What a cell reads that takes no more.
-        cells: What presses, of shape (rows, columns); None before the first frame.
         answer: To the last frame; None before the first.
         rate: Answers a second, lately, and of all frames once it is over; 0 before
             the second.
@@ -127,7 +227,6 @@ class LiveView:
     model: str
     classes: tuple[str, ...]
     full: int
-    cells: Cells | None
     answer: LiveResult | None
     rate: float
     latency: Latency | None
@@ -144,14 +243,43 @@ class Live:
     `answers` gives one for each frame as soon as there is one. Displays live in
     threads of their own: they `wait` for news and take a `view` when they have time,
     so that a slow one misses frames and never holds up an answer.
+
+    Args:
+        model: A tree or a rule base whose inputs are names of features.
+        sensor: Whose frames come.
+        source: Where they come from.
+        name: That of the source.
+        reject: The floor of the strength, as of `Recogniser`.
+        follow_s: In how many seconds the baseline follows; 0 to keep it.
+        vote_s: How long the answers to an object vote; 0 for each frame's own.
+        least: The fewest cells of an object.
+
+    Attributes:
+        rest: What the cells read at rest.
+        left_out: How many regions were too small for an object.
     """
 
-    def __init__(self, recogniser: Recogniser, source: FrameSource, name: str) -> None:
-        self.recogniser, self.source, self.name = recogniser, source, name
+    def __init__(
+        self,
+        model: Model,
+        sensor: Sensor,
+        source: FrameSource,
+        name: str,
+        *,
+        reject: float = 0.0,
+        follow_s: float = FOLLOW_S,
+        vote_s: float = 0.0,
+        least: int = LEAST_AREA,
+    ) -> None:
+        self.source, self.name = source, name
+        self.rest = Rest(sensor, follow_s)
+        self.recogniser = Recogniser(model, self.rest.bare, reject)
+        self._least, self._tracker = least, Tracker(vote_s)
+        self._tare_wanted = threading.Event()
         self._news = threading.Condition()
         self._answer: LiveResult | None = None
         self._number = 0
-        self._refused = 0
+        self._refused = self.left_out = 0
         self._is_over = False
         self._began = source.now()
         self._latencies = np.zeros(_KEPT)
@@ -160,13 +288,21 @@ class Live:
         self._counted = _failures(source.counters)
         self._past: tuple[str, float] = "", -_SHOWN_S
 
+    def tare(self) -> None:
+        """Take what the next frames read for the baseline; from any thread."""
+        self._tare_wanted.set()
+
     def answers(self, most: int | None = None) -> Iterator[LiveResult]:
         """Give an answer for each frame, `most` of them, or until there are no more."""
         try:
             for frame in itertools.islice(self.source, most):
+                if self._tare_wanted.is_set():
+                    self._tare_wanted.clear()
+                    self.rest.tare()
                 answer = self._answered(frame)
                 yield answer
                 self._show(answer)
+                self.rest.follow()
         finally:
             with self._news:
                 self._is_over = True
@@ -184,15 +320,13 @@ class Live:
 
     def view(self) -> LiveView:
         """Return what there is to see now."""
-        model, sensor = self.recogniser.model, self.recogniser.sensor
+        model, sensor = self.recogniser.model, self.rest.bare
         now, answer = self.source.now(), self._answer
-        is_asked = answer is not None and answer.state is not None
         return LiveView(
             self.name,
             model.name,
             model.classes,
             sensor.full,
-            pressed(sensor, answer.frame.cells)[0] if answer and is_asked else None,
             answer,
             self._rate(),
             self._latency(),
@@ -205,25 +339,48 @@ class Live:
 
     def _answered(self, frame: Frame) -> LiveResult:
         try:
-            found = self.recogniser(frame.cells)
+            cells = self.rest(frame.cells, frame.time)
         except TableError as error:  # of another size: the next one may fit
             self._refused += 1
             late = self.source.now() - frame.time
-            return LiveResult(frame, None, -1, "", (), 0, late, str(error))
-        code = int(found.codes[0])
-        state, saturated = State(int(found.states[0])), int(found.saturated[0])
-        cells = "1 cell takes" if saturated == 1 else f"{saturated} cells take"
-        trouble = f"{cells} no more: the frame is saturated" if saturated else ""
-        return LiveResult(
-            frame,
-            state,
-            code,
-            found.classes[code] if code >= 0 else "",
-            tuple(found.strengths[:, 0].tolist()),
-            saturated,
-            self.source.now() - frame.time,
-            trouble,
-        )
+            return LiveResult(frame, None, (), 0, 0, late, str(error), ())
+        found, left_out = regions(cells, self._least)
+        self.left_out += left_out
+        objects = self._recognised(frame.time, found)
+        count = self.rest.saturated(frame.cells)
+        some = "1 cell takes" if count == 1 else f"{count} cells take"
+        trouble = f"{some} no more: the frame is saturated" if count else ""
+        late = self.source.now() - frame.time
+        events = tuple(self.rest.news())
+        return LiveResult(frame, cells, objects, left_out, count, late, trouble, events)
+
+    def _recognised(
+        self, time: float, found: Sequence[Region]
+    ) -> tuple[SensorObject, ...]:
+        """Return the objects of a frame, each recognised by its own cells."""
+        if not found:
+            self._tracker(time, (), ())
+            return ()
+        frames = np.stack([one.cells for one in found])
+        seen = self.recogniser(frames)
+        voted = self._tracker(time, found, seen.codes.tolist())
+        objects: list[SensorObject] = []
+        for place, (region, (number, code)) in enumerate(
+            zip(found, voted, strict=True)
+        ):
+            is_known = code is not None and code >= 0
+            objects.append(
+                SensorObject(
+                    number,
+                    State.OBJECT if is_known else State.UNKNOWN,
+                    code if code is not None and is_known else -1,
+                    seen.classes[code] if code is not None and is_known else "",
+                    tuple(seen.strengths[:, place].tolist()),
+                    region,
+                    self.recogniser,
+                )
+            )
+        return tuple(objects)
 
     def _show(self, answer: LiveResult) -> None:
         """Keep a result for the displays, and notify them."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from fuzzytree.errors import TableError
 from fuzzytree.model import FloatArray, FuzzyTree, IntArray, Model, RuleBase, Run
-from fuzzytree.runtimes import load
+from fuzzytree.runtimes import class_probabilities, load
 from fuzzytree.semantics import Status, rules_from_tree
 from fuzzytree.tactile.features.names import feature_of
 from fuzzytree.tactile.features.plain import State as State
@@ -86,6 +88,7 @@ class Recogniser:
         check_reject(rules, reject)
         self.model, self.sensor, self.reject = model, sensor, reject
         self.plan = FramePlan(sensor, model.inputs)
+        self._place = FramePlan(sensor, ("x", "y", "angle"))
         self._decide: Run = load(model)
         self._fire: Run | None = load(rules) if rules is not model else None
         number = {label: place for place, label in enumerate(model.classes)}
@@ -93,6 +96,8 @@ class Recogniser:
         if isinstance(model, FuzzyTree):
             ends = [leaf.label for leaf in model.leaves]
         self._class_of = np.array([number[label] for label in ends], np.int64)
+        self._rated = _probable(model)
+        self._rate: Run | None = load(self._rated) if self._rated else None
         semantics = model.semantics
         self._uncovered = (
             -1 if semantics.uncovered is None else number[semantics.uncovered]
@@ -131,6 +136,32 @@ class Recogniser:
             features,
         )
 
+    def probabilities(self, frame: Cells) -> tuple[float, ...]:
+        """Return the probability of each class for one frame.
+
+        Empty where the model has none, and where no rule fires.
+        """
+        if self._rated is None or self._rate is None:
+            return ()
+        outcome = self._rate(self.plan(frame).values)
+        if outcome.strengths is None:  # rules that are fired have strengths
+            raise TypeError(f"{self.model.name}: no strengths")
+        found = class_probabilities(self._rated, outcome.strengths, outcome.rule)
+        row = [] if found is None else found[:, 0].tolist()
+        return () if any(map(math.isnan, row)) else tuple(row)
+
+    def place(self, frame: Cells) -> tuple[float, float, float]:
+        """Return x and y of the centre of pressure of a frame, and its angle."""
+        x, y, angle = self._place(frame).values[:, 0].tolist()
+        return x, y, angle
+
+
+def _probable(model: Model) -> RuleBase | None:
+    """Return the rules that mix the probabilities of a model; None without any."""
+    if model.semantics.sharpness is msgspec.UNSET:
+        return None
+    return model if isinstance(model, RuleBase) else rules_from_tree(model)
+
 
 def usual_floor(model: Model) -> float:
     """Return the floor of strength below which one usually rejects.
@@ -167,3 +198,14 @@ def check_inputs(model: Model) -> None:
             feature_of(name)
         except TableError as error:
             raise TableError(f"{model.name} uses other features: {error}") from error
+
+
+def checked_model(model: object, name: str) -> Model:
+    """Return a model of frames: a tree or a rule base.
+
+    Raises:
+        TableError: If it is something else; it begins with the name.
+    """
+    if not isinstance(model, FuzzyTree | RuleBase):
+        raise TableError(f"{name}: a model of frames is a tree or a rule base")
+    return model

@@ -12,8 +12,15 @@ from rich.cells import cell_len, set_cell_size
 
 from fuzzytree.model import printable
 from fuzzytree.tactile.interpolation import interpolated
-from fuzzytree.tactile.recognition.live import SENTENCES, STATES, LiveResult, LiveView
-from fuzzytree.tactile.recognition.recogniser import State
+from fuzzytree.tactile.link.starting import named
+from fuzzytree.tactile.recognition.live import (
+    SENTENCES,
+    STATES,
+    LiveResult,
+    LiveView,
+    SensorObject,
+)
+from fuzzytree.tactile.rest import RestEvent
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -31,6 +38,7 @@ _EIGHTHS = " ▏▎▍▌▋▊▉"
 _BOLD, _DIM, _END = "\x1b[1m", "\x1b[2m", "\x1b[0m"
 _NAME = 18  # the widest column of classes
 _BAR = 150  # the shade of a bar: it can be seen on white and on black
+_LEAST_LEGEND = 4  # signs of colours
 _SIDE = 34  # columns beside a picture
 
 
@@ -165,9 +173,8 @@ def headline(view: LiveView) -> str:
         return "waiting for the first frame"
     if answer.state is None:
         return "a frame that does not fit"
-    if answer.state is State.OBJECT:
-        return visible(answer.label)
-    return SENTENCES[answer.state]
+    names = [one.label or SENTENCES[one.state] for one in answer.objects]
+    return visible(" + ".join(names)) or SENTENCES[answer.state]
 
 
 def status(view: LiveView) -> str:
@@ -178,6 +185,22 @@ def status(view: LiveView) -> str:
     if view.silent_s >= SILENT_S:
         parts.append(f"no frame for {view.silent_s:.0f} s")
     return visible("; ".join(parts))
+
+
+def whereabouts(found: SensorObject) -> str:
+    """Return where the centre of pressure of an object is, and how many cells press.
+
+    From the middle of the sensor, to the right and upwards.
+    """
+    return f"centre {found.x:+.1f}, {found.y:+.1f}; {found.region.area} cells"
+
+
+def event_text(event: RestEvent) -> str:
+    """Return in words what has changed in what cells read at rest."""
+    if event.kind == "tare":
+        return "tared: what the cells read now is their baseline"
+    what = "pressed alone all the time" if event.kind == "hot" else "never pressed"
+    return f"{event.kind} cells, masked: {named(event.cells)} ({what})"
 
 
 def counts(view: LiveView) -> str:
@@ -198,20 +221,30 @@ def timing(view: LiveView) -> str:
     return f"{view.rate:.1f} frames/s; answer after {spread}"
 
 
-def screen(view: LiveView, columns: int, lines: int, *, look: Look, times: int) -> str:
+def screen(
+    view: LiveView,
+    columns: int,
+    lines: int,
+    *,
+    look: Look,
+    times: int,
+    keys: str = "Ctrl-C ends",
+) -> str:
     """Return a whole screen: at most `lines` lines of at most `columns` signs."""
     bold, dim = (_BOLD, _DIM) if look != "plain" else ("", "")
     end = _END if bold else ""
     head = f"{visible(view.source)} -> {visible(view.model)}"
-    foot = [counts(view), timing(view), status(view) or "Ctrl-C ends"]
+    foot = [counts(view), timing(view), status(view) or keys]
     styles = [dim, dim, bold if status(view) else dim]
     room = max(lines - len(foot) - 2, 1)
     is_wide = columns >= 2 * _SIDE
     beside = columns - _SIDE if is_wide else columns
     above = room if is_wide else max(room - min(len(view.classes), 4) - 2, 1)
     drawn: list[str] = []
-    if view.cells is not None:
-        drawn = picture(view.cells, view.full, beside, above, look=look, times=times)
+    cells = view.answer.cells if view.answer else None
+    if cells is not None:
+        drawn = picture(cells, view.full, beside, above - 1, look=look, times=times)
+        drawn.append(_legend(view.full, drawn, look=look))
     facts = _facts(view, room if is_wide else room - len(drawn), look=look)
     body = _side_by_side(drawn, facts) if is_wide else [*drawn, *facts]
     footer = [
@@ -220,6 +253,23 @@ def screen(view: LiveView, columns: int, lines: int, *, look: Look, times: int) 
     ]
     title = f"{bold}{_cut(head, columns)}{end}"
     return "\n".join([title, *body[:room], "", *footer][:lines])
+
+
+def _legend(full: int, drawn: Sequence[str], *, look: Look) -> str:
+    """Return the colours of 0 to full in a line as wide as a picture."""
+    width = drawn[0].count("▀") or len(drawn[0])
+    low, high = "0 ", f" {full}"
+    room = width - len(low) - len(high)
+    if room < _LEAST_LEGEND:
+        return " " * width
+    shades_shown = [255 * place // (room - 1) for place in range(room)]
+    if look == "plain":
+        last = len(_RAMP) - 1
+        bar = "".join(_RAMP[-(-one * last // 255)][1] for one in shades_shown)
+    else:
+        codes = _CODES[look]
+        bar = "".join(f"\x1b[38;{codes[one]}m▀" for one in shades_shown) + _END
+    return f"{low}{bar}{high}"
 
 
 def _side_by_side(drawn: Sequence[str], facts: Sequence[str]) -> list[str]:
@@ -236,10 +286,14 @@ def _side_by_side(drawn: Sequence[str], facts: Sequence[str]) -> list[str]:
 def _facts(view: LiveView, lines: int, *, look: Look) -> list[str]:
     """Return the answer and the strengths of the classes."""
     bold, end = ("", "") if look == "plain" else (_BOLD, _END)
-    found = [f"{bold}{_cut(headline(view), _SIDE - 2)}{end}", ""]
+    found = [f"{bold}{_cut(headline(view), _SIDE - 2)}{end}"]
     answer = view.answer
     if answer is None or not answer.strengths:
-        return found
+        return [*found, ""]
+    for one in answer.objects[:3]:
+        name = f"{one.number} " if len(answer.objects) > 1 else ""
+        found.append(_cut(name + whereabouts(one), _SIDE - 2))
+    found.append("")
     room = max(lines - len(found), 0)
     count = room if room >= len(view.classes) else max(room - 1, 0)
     order = sorted(
@@ -272,28 +326,61 @@ def _cut(text: str, columns: int) -> str:
     return text if cell_len(text) <= columns else set_cell_size(text, columns)
 
 
-def line_facts(answer: LiveResult) -> dict[str, object]:
-    """Return a recognised object as facts for other programs, the fields of a line."""
+def line_facts(answer: LiveResult) -> list[dict[str, object]]:
+    """Return what a frame shows as facts for other programs: a line for each object.
+
+    Without an object there is one line, whose fields of an object are None.
+    """
     state = "unknown" if answer.state is None else STATES[answer.state]
-    return {
+    begin: dict[str, object] = {
         "time": round(answer.frame.time, 6),
         "frame": answer.frame.number,
-        "state": state,
-        "class": answer.label or None,
-        "strength": answer.strength,
-        "saturated": answer.saturated,
     }
+    if not answer.objects:
+        rest: dict[str, object] = dict.fromkeys(_PLACE)
+        facts = {"state": state, "class": None, "strength": 0.0}
+        return [begin | facts | {"saturated": answer.saturated, "object": None} | rest]
+    return [
+        begin
+        | {
+            "state": STATES[one.state],
+            "class": one.label or None,
+            "strength": one.strength,
+            "saturated": answer.saturated,
+            "object": one.number,
+            "x": round(one.x, 3),
+            "y": round(one.y, 3),
+            "angle": round(one.angle, 3),
+            "area": one.region.area,
+            "force": one.region.force,
+            "box": one.box,
+        }
+        for one in answer.objects
+    ]
 
 
-def line(answer: LiveResult) -> str:
-    r"""Return a recognised object as a line of fields with tabs between them.
+_PLACE = ("x", "y", "angle", "area", "force", "box")
+
+
+def lines(answer: LiveResult) -> str:
+    r"""Return what a frame shows as lines of fields with tabs between them.
 
     A backslash, tab or end of line within a class's name is written as `\\`, `\t`,
     `\n` or `\r`, as in the text format of PostgreSQL; what else cannot be printed,
-    such as commands for a terminal, as `\x1b` or `\u202e`.
+    such as commands for a terminal, as `\x1b` or `\u202e`. A box is four numbers
+    with commas between them.
     """
-    facts = line_facts(answer) | {"class": escaped(answer.label)}
-    return "\t".join(map(str, facts.values()))
+
+    def text(value: object) -> str:
+        if isinstance(value, tuple):
+            return ",".join(map(str, value))
+        if isinstance(value, str):
+            return escaped(value)
+        return "" if value is None else str(value)
+
+    return "\n".join(
+        "\t".join(map(text, facts.values())) for facts in line_facts(answer)
+    )
 
 
 def escaped(text: str) -> str:

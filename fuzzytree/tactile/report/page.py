@@ -27,7 +27,13 @@ from fuzzytree.tactile.recognition.live import (
     LiveView,
 )
 from fuzzytree.tactile.recognition.recogniser import State
-from fuzzytree.tactile.report.live import PALETTE, headline, shades, status
+from fuzzytree.tactile.report.live import (
+    PALETTE,
+    headline,
+    shades,
+    status,
+    whereabouts,
+)
 
 if TYPE_CHECKING:
     from socketserver import BaseServer
@@ -47,6 +53,9 @@ _RETRY_MS = 1000  # before a browser reconnects
 _BACKLOG = 1 << 16  # bytes that wait for a slow browser: newer frames replace older
 _MOST_POINTS = 1 << 16  # of a picture
 
+_TARE = ("POST", "/tare")
+_EVENTS = re.compile(r"/events(?:\?times=([1-9]))?")
+
 _HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -61,8 +70,7 @@ class LivePage(contextlib.AbstractContextManager["LivePage"]):
     """Serves the page of what is recognised, in threads, until it is closed.
 
     It listens on 127.0.0.1, answers only what names that host (a page of another name
-    that leads here is refused), only GET, only its two paths, and no page of another
-    place.
+    that leads here is refused), only its own paths, and no page of another place.
 
     Args:
         live: What is shown.
@@ -175,11 +183,12 @@ class _Handler(BaseHTTPRequestHandler):
         if not super().parse_request():
             return False
         origin = self.headers.get("Origin", "").lower().removeprefix("http://")
-        if self.command != "GET":
+        if self.command != "GET" and (self.command, self.path) != _TARE:
             self._refuse(HTTPStatus.METHOD_NOT_ALLOWED, "only GET is answered")
         elif self.headers.get("Host", "").lower() not in self.own.hosts:
             self._refuse(HTTPStatus.MISDIRECTED_REQUEST, "this is another host")
-        elif origin and origin not in self.own.hosts:  # the page of another site
+        elif (origin or self.command == "POST") and origin not in self.own.hosts:
+            # the page of another site
             self._refuse(HTTPStatus.FORBIDDEN, "only this page is answered")
         else:
             return True
@@ -190,11 +199,16 @@ class _Handler(BaseHTTPRequestHandler):
         if self.path == "/":
             self._begin(HTTPStatus.OK, "text/html; charset=utf-8")
             self.wfile.write(self.own.content)
-        elif self.path == "/events":
+        elif found := _EVENTS.fullmatch(self.path):
             self._begin(HTTPStatus.OK, "text/event-stream")
-            self._send_events()
+            self._send_events(int(found[1] or self.own.times))
         else:
             self._refuse(HTTPStatus.NOT_FOUND, "there is / and nothing else")
+
+    def do_POST(self) -> None:
+        """Tare the sensor."""
+        self.own.live.tare()
+        self._begin(HTTPStatus.NO_CONTENT, "text/plain; charset=utf-8")
 
     def _begin(self, code: HTTPStatus, kind: str) -> None:
         self.send_response(code)
@@ -210,7 +224,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._begin(code, "text/plain; charset=utf-8")
         self.wfile.write(f"{text}\n".encode())
 
-    def _send_events(self) -> None:
+    def _send_events(self, times: int) -> None:
         """Send what there is to see, the newest only, until it is over."""
         live, server = self.own.live, self.own
         self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BACKLOG)
@@ -220,7 +234,7 @@ class _Handler(BaseHTTPRequestHandler):
         while not is_over:
             view = live.view()
             is_over = view.is_over or server.is_closing.is_set()
-            self._send("view", view_facts(view, server.times, is_over=is_over))
+            self._send("view", view_facts(view, times, is_over=is_over))
             if not is_over:
                 time.sleep(1 / _REFRESHES)
                 seen = live.wait(seen, _ALIVE_S)
@@ -273,11 +287,16 @@ def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object
         "status": status(dataclasses.replace(view, is_over=is_over)),
         "over": is_over,
     }
-    if view.cells is not None:
-        while times > 1 and view.cells.size * times**2 > _MOST_POINTS:
+    if answer is not None and answer.cells is not None:
+        while times > 1 and answer.cells.size * times**2 > _MOST_POINTS:
             times -= 1
-        facts |= _points(view, view.cells, times)
-        facts["cells"] = _points(view, view.cells, 1)
+        facts |= _points(view, answer.cells, times)
+        facts["times"] = times
+        facts["cells"] = _points(view, answer.cells, 1)
+        facts["objects"] = [
+            {"name": one.label or "unknown", "x": one.x, "y": one.y, "box": one.box}
+            for one in answer.objects
+        ]
     return facts
 
 
@@ -290,8 +309,11 @@ def _points(view: LiveView, cells: Cells, times: int) -> dict[str, object]:
 def _sentence(answer: LiveResult | None) -> str:
     if answer is None or answer.state is None:
         return ""
-    if answer.state is State.OBJECT:
-        return f"{SENTENCES[answer.state]}, strength {answer.strength:.2f}"
+    if len(answer.objects) > 1:
+        return f"{len(answer.objects)} objects; the strengths are the first one's"
+    if answer.objects and answer.state is State.OBJECT:
+        where = whereabouts(answer.objects[0])
+        return f"{SENTENCES[answer.state]}, strength {answer.strength:.2f}; {where}"
     return "the sensor is free" if answer.state is State.NOTHING else "rejected"
 
 

@@ -40,7 +40,7 @@ Call = Callable[..., tuple[int, str, str]]
 
 NOTHING = np.zeros((4, 4), np.int64)
 SMALL = np.eye(4, dtype=np.int64) * 9
-LARGE = np.full((4, 4), 9)
+LARGE = np.full((4, 4), 99)
 SHOWN = [NOTHING] * 4 + [SMALL] * 4 + [LARGE] + [SMALL] * 2 + [LARGE] * 3
 BOARD = Board(
     "mat", Sensor(4, 4), Marker("AA 55", checksum="sum8"), start=Start(frames=3)
@@ -107,8 +107,13 @@ def test_lines_of_json_have_the_fields_of_lines_with_tabs(call: Call) -> None:
     assert err == ""
     rows = [json.loads(line) for line in out.splitlines()]
     for row, line in zip(rows, tabs.splitlines(), strict=True):
+        if row["box"] is not None:
+            row["box"] = ",".join(map(str, row["box"]))
         assert "\t".join("" if v is None else str(v) for v in row.values()) == line
-    assert [*rows[0]] == ["time", "frame", "state", "class", "strength", "saturated"]
+    assert [*rows[0]] == [
+        *("time", "frame", "state", "class", "strength", "saturated"),
+        *("object", "x", "y", "angle", "area", "force", "box"),
+    ]
 
 
 def test_live_ends_after_the_frames_requested_and_keeps_them(call: Call) -> None:
@@ -183,11 +188,11 @@ def test_a_model_of_other_features_is_refused_by_name(call: Call) -> None:
     [
         (
             ("none.ftr",),
-            "none.ftr is no recording; for a port, name its board with --board",
+            "none.ftr is no recording; for a port, name its board",
         ),
         (
             ("some.ftr", "--board", "mat.yaml"),
-            "--board is for a port; some.ftr has its own",
+            "a board is for a port; some.ftr has its own",
         ),
     ],
 )
@@ -390,7 +395,7 @@ def test_nobody_who_reads_the_lines_ends_live_quietly(
     ) as run:
         assert run.stdout is not None
         assert run.stderr is not None
-        assert run.stdout.readline().count("\t") == 5
+        assert run.stdout.readline().count("\t") == 12
         run.stdout.close()
         assert run.wait(60) == 141
         assert run.stderr.read() == ""

@@ -17,7 +17,6 @@ import pytest
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.recognition.live import Live, LiveResult
-from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.report.page import LivePage
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
@@ -123,7 +122,7 @@ def seen(browser: Any) -> Iterator[Seen]:
     labels = ["s", "s", "s", EVIL, EVIL, EVIL]
     tree = learn(table(areas, columns=["area"]), target=labels, name="sizes")
     source = Shown()
-    live = Live(Recogniser(tree, Sensor(4, 4), 0.05), source, "a board")
+    live = Live(tree, Sensor(4, 4), source, "a board", reject=0.05)
     with LivePage(live) as page:
         found = Seen(browser, live, source, page)
         yield found
@@ -182,7 +181,7 @@ def test_the_page_comes_back_when_live_is_started_anew(seen: Seen) -> None:
     source = Shown()
     source.put(NOTHING)
     source.put(None)
-    live = Live(seen.live.recogniser, source, "another board")
+    live = Live(seen.live.recogniser.model, Sensor(4, 4), source, "another board")
     answers = live.answers()
     next(answers)
     with LivePage(live, int(seen.page.url.strip("/").rpartition(":")[2])):

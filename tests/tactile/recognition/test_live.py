@@ -15,19 +15,19 @@ from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.link.recording import FrameRecord
 from fuzzytree.tactile.recognition.frame_sources import Paced, simulated
 from fuzzytree.tactile.recognition.live import Hold, Live
-from fuzzytree.tactile.recognition.recogniser import Recogniser, State
+from fuzzytree.tactile.recognition.recogniser import State
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
 SENSOR = Sensor(4, 4)
 SMALL = np.eye(4, dtype=np.uint8)
-LARGE = np.full((4, 4), 9, np.uint8)
+LARGE = np.full((4, 4), 99, np.uint8)
 NOTHING = np.zeros((4, 4), np.uint8)
 AREAS = np.array([[4.0], [5.0], [16.0], [15.0]])
 
 
-def recogniser(reject: float = 0.0) -> Recogniser:
+def shown(source: Paced, **settings: float) -> Live:
     tree = learn(table(AREAS, columns=["area"]), target=["s", "s", "l", "l"])
-    return Recogniser(tree, SENSOR, reject)
+    return Live(tree, SENSOR, source, "frames", **settings)  # type: ignore[arg-type] # mypy sees no names
 
 
 def records(frames: Iterable[Cells], **counters: int) -> Iterator[FrameRecord]:
@@ -37,7 +37,7 @@ def records(frames: Iterable[Cells], **counters: int) -> Iterator[FrameRecord]:
 
 
 def live(frames: Iterable[Cells], **counters: int) -> Live:
-    return Live(recogniser(), Paced(records(frames, **counters), 0.0), "frames")
+    return shown(Paced(records(frames, **counters), 0.0))
 
 
 def test_every_frame_is_answered_and_the_last_one_is_seen() -> None:
@@ -51,8 +51,8 @@ def test_every_frame_is_answered_and_the_last_one_is_seen() -> None:
     ]
     view = found.view()
     assert view.answer is answers[-1]
-    assert view.cells is not None
-    assert view.cells.tolist() == LARGE.tolist()
+    assert answers[-1].cells is not None
+    assert answers[-1].cells.tolist() == LARGE.tolist()
     assert view.rate == pytest.approx(100.0)
     assert view.counters["frames"] == 3
     assert view.is_over
@@ -61,14 +61,14 @@ def test_every_frame_is_answered_and_the_last_one_is_seen() -> None:
 def test_the_rate_of_all_is_that_of_the_answers() -> None:
     frames = [Frame(SMALL, number / 100, number) for number in (0, 1, 2, 3, 50, 51)]
     source = Paced([FrameRecord(one, Counters(frames=1)) for one in frames], 0.0)
-    found = Live(recogniser(), source, "frames")
+    found = shown(source)
     assert len(list(found.answers())) == 6
     assert found.view().rate == pytest.approx(5 / 0.51)
 
 
 def test_before_the_first_frame_there_is_nothing_to_see() -> None:
     view = live([]).view()
-    assert (view.cells, view.answer, view.latency) == (None, None, None)
+    assert (view.answer, view.latency) == (None, None)
     assert (view.rate, view.trouble, view.is_over) == (0.0, "", False)
 
 
@@ -143,7 +143,7 @@ def test_the_largest_latency_is_that_of_all_and_the_median_of_the_last() -> None
 
 
 def test_the_strength_is_that_of_the_class_or_the_largest_one() -> None:
-    found = Live(recogniser(1.0), Paced(records([SMALL, LARGE * 0 + 9]), 0.0), "x")
+    found = shown(Paced(records([SMALL, LARGE]), 0.0), reject=1.0)
     for answer in found.answers():
         own = answer.strengths[answer.code] if answer.label else max(answer.strengths)
         assert answer.strength == own

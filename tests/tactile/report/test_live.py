@@ -10,15 +10,23 @@ import numpy as np
 import pytest
 from rich.cells import cell_len
 
-from fuzzytree.tactile.recognition.live import Latency, LiveResult, LiveView
-from fuzzytree.tactile.recognition.recogniser import State
+import fuzzytree as ft
+from fuzzytree.tactile.recognition.live import (
+    Latency,
+    LiveResult,
+    LiveView,
+    SensorObject,
+)
+from fuzzytree.tactile.recognition.objects import Region
+from fuzzytree.tactile.recognition.recogniser import Recogniser, State
 from fuzzytree.tactile.report.live import (
     PALETTE,
     Look,
     counts,
     escaped,
-    line,
+    event_text,
     line_facts,
+    lines,
     picture,
     screen,
     shades,
@@ -26,18 +34,39 @@ from fuzzytree.tactile.report.live import (
     timing,
     visible,
 )
-from fuzzytree.tactile.sensor import Cells, Counters, Frame
+from fuzzytree.tactile.rest import RestEvent
+from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
 CELLS = np.array([[0, 10, 20], [0, 255, 30]], np.int64)
-ANSWER = LiveResult(
-    Frame(CELLS, 1.25, 55), State.OBJECT, 1, "soft", (0.0, 0.75), 1, 4e-4, "a cell"
+AREAS = np.array([[1.0], [9.0]])
+SOFT = SensorObject(
+    number=3,
+    state=State.OBJECT,
+    code=1,
+    label="soft",
+    strengths=(0.0, 0.75),
+    region=Region(CELLS, (0, 1, 2, 3), 4, 315),
+    recogniser=Recogniser(
+        ft.learn(
+            ft.table(np.array([[1.0], [9.0]]), columns=["area"]), target=["a", "b"]
+        ),
+        Sensor(2, 3),
+    ),
 )
+ANSWER = LiveResult(Frame(CELLS, 1.25, 55), CELLS, (SOFT,), 0, 1, 4e-4, "a cell", ())
+
+
+def showing(**changes: object) -> LiveResult:
+    """Return the answer with a changed object."""
+    other = dataclasses.replace(SOFT, **changes)  # type: ignore[arg-type] # by name
+    return dataclasses.replace(ANSWER, objects=(other,))
+
+
 VIEW = LiveView(
     source="/dev/ttyUSB0",
     model="grip",
     classes=("firm", "soft"),
     full=255,
-    cells=CELLS,
     answer=ANSWER,
     rate=43.96,
     latency=Latency(4e-4, 9e-4, 2e-3),
@@ -57,7 +86,8 @@ def test_a_screen_shows_class_strengths_counters_and_latency() -> None:
     assert screen(VIEW, 70, 12, look="plain", times=1).split("\n") == [
         "/dev/ttyUSB0 -> grip",
         " .::::  soft",
-        " .@@::  ",
+        " .@@::  centre +0.2, -0.4; 4 cells",
+        "        ",
         "        firm 0.00 ",
         "        soft 0.75 ################",
         "",
@@ -72,20 +102,20 @@ def test_a_screen_shows_class_strengths_counters_and_latency() -> None:
 def test_a_screen_is_never_larger_than_the_terminal(
     look: Look, size: tuple[int, int]
 ) -> None:
-    columns, lines = size
+    columns, most = size
     classes = tuple(f"class number {place}" for place in range(40))
-    answer = dataclasses.replace(ANSWER, strengths=(0.5,) * 40)
-    cells = np.zeros((16, 16), np.int64)
-    view = dataclasses.replace(VIEW, classes=classes, answer=answer, cells=cells)
-    found = screen(view, columns, lines, look=look, times=3).split("\n")
-    assert len(found) <= lines
+    answer = showing(strengths=(0.5,) * 40)
+    answer = dataclasses.replace(answer, cells=np.zeros((16, 16), np.int64))
+    view = dataclasses.replace(VIEW, classes=classes, answer=answer)
+    found = screen(view, columns, most, look=look, times=3).split("\n")
+    assert len(found) <= most
     assert max(cell_len(bare(text)) for text in found) <= max(columns, 2)
 
 
 def test_a_picture_takes_the_largest_number_of_points_that_fits() -> None:
     cells = np.zeros((4, 4), np.int64)
-    for lines, found in ((2, 2), (4, 4), (6, 6), (60, 6)):
-        assert len(picture(cells, 255, 80, lines, look="full", times=3)) == found
+    for most, found in ((2, 2), (4, 4), (6, 6), (60, 6)):
+        assert len(picture(cells, 255, 80, most, look="full", times=3)) == found
 
 
 def test_a_sensor_larger_than_the_terminal_loses_no_pressed_cell() -> None:
@@ -127,7 +157,7 @@ def test_a_status_reports_of_trouble_of_silence_and_of_the_end() -> None:
 
 
 def test_before_the_first_frame_a_screen_says_that_it_waits() -> None:
-    view = dataclasses.replace(VIEW, answer=None, cells=None, latency=None)
+    view = dataclasses.replace(VIEW, answer=None, latency=None)
     found = screen(view, 80, 24, look="plain", times=3)
     assert "waiting for the first frame" in found
     assert timing(view) == ""
@@ -140,7 +170,7 @@ def test_counters_of_failures_are_reported_above_zero_only() -> None:
 
 def test_no_name_of_a_class_controls_the_terminal() -> None:
     evil = "a\x1b[2J\x07\nb\x9b1m"
-    answer = dataclasses.replace(ANSWER, label=evil)
+    answer = showing(label=evil)
     view = dataclasses.replace(VIEW, classes=("firm", evil), answer=answer)
     found = screen(view, 80, 24, look="plain", times=1)
     assert visible(evil) == "a?[2J??b?1m"
@@ -148,14 +178,38 @@ def test_no_name_of_a_class_controls_the_terminal() -> None:
     assert not set(found) & set("\x1b\x07\x9b")
 
 
-def test_a_line_has_six_fields_between_tabs() -> None:
-    assert line(ANSWER) == "1.25\t55\tobject\tsoft\t0.75\t1"
-    nothing = dataclasses.replace(ANSWER, state=State.NOTHING, code=-1, label="")
-    assert line(nothing) == "1.25\t55\tnothing\t\t0.75\t1"
-    assert line_facts(nothing)["class"] is None
+def test_a_line_has_twelve_fields_between_tabs() -> None:
+    place = "3\t0.159\t-0.405\t31.957\t4\t315\t0,1,2,3"
+    assert lines(ANSWER) == f"1.25\t55\tobject\tsoft\t0.75\t1\t{place}"
+    unknown = showing(state=State.UNKNOWN, code=-1, label="")
+    assert lines(unknown) == f"1.25\t55\tunknown\t\t0.75\t1\t{place}"
+    nothing = dataclasses.replace(ANSWER, objects=())
+    assert lines(nothing) == "1.25\t55\tnothing\t\t0.0\t1\t\t\t\t\t\t\t"
+    assert line_facts(nothing)[0]["class"] is None
+
+
+def test_two_objects_are_two_lines_and_stand_in_the_headline() -> None:
+    two = dataclasses.replace(
+        ANSWER, objects=(SOFT, dataclasses.replace(SOFT, number=4, label="firm"))
+    )
+    assert [one["object"] for one in line_facts(two)] == [3, 4]
+    assert lines(two).count("\n") == 1
+    view = dataclasses.replace(VIEW, answer=two)
+    found = screen(view, 80, 24, look="plain", times=1)
+    assert "soft + firm" in found
+    assert "4 centre +0.2, -0.4; 4 cells" in found
+
+
+def test_changes_of_what_cells_read_at_rest_are_sentences() -> None:
+    assert event_text(RestEvent("tare")) == (
+        "tared: what the cells read now is their baseline"
+    )
+    assert event_text(RestEvent("hot", ((2, 5),))) == (
+        "hot cells, masked: r2 c5 (pressed alone all the time)"
+    )
 
 
 def test_a_name_with_tabs_and_ends_of_lines_stays_one_field() -> None:
     assert escaped("a\tb\\c\r\n") == "a\\tb\\\\c\\r\\n"
     assert escaped("\x1b[2J\x9b\u202eä") == "\\x1b[2J\\x9b\\u202eä"
-    assert line(dataclasses.replace(ANSWER, label="a\tb\n")).count("\t") == 5
+    assert lines(showing(label="a\tb\n")).count("\t") == 12

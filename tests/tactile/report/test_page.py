@@ -21,7 +21,6 @@ from fuzzytree.errors import PortError
 from fuzzytree.tactile.link.recording import FrameRecord
 from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
-from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.report.page import MOST_BROWSERS, LivePage
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
@@ -36,7 +35,7 @@ def shown(frames: int | None = None) -> Live:
         FrameRecord(Frame(LARGE, number / 100, number), Counters(frames=number + 1))
         for number in (itertools.count() if frames is None else range(frames))
     )
-    return Live(Recogniser(tree, Sensor(4, 4)), Paced(records), "frames")
+    return Live(tree, Sensor(4, 4), Paced(records), "frames")
 
 
 @pytest.fixture
@@ -139,6 +138,31 @@ def test_only_get_is_answered(page: LivePage, method: str) -> None:
     found = wanted(page, method=method)
     assert found.status == 405
     assert found.headers["Allow"] == "GET"
+
+
+def test_a_button_of_the_page_tares_and_no_other_page_does(
+    page: LivePage, live: Live
+) -> None:
+    own = page.url.rstrip("/")
+    answers = live.answers()
+    assert next(answers).objects
+    for origin in (None, "http://evil.example"):
+        assert wanted(page, "/tare", "POST", origin=origin).status == 403
+    assert wanted(page, "/tare", "POST", origin=own).status == 204
+    events = [event for _ in range(11) for event in next(answers).events]
+    assert [event.kind for event in events] == ["tare"]
+    assert next(answers).objects == ()  # what lies there is the baseline now
+
+
+def test_a_browser_chooses_the_points_of_its_picture(
+    page: LivePage, live: Live
+) -> None:
+    answers = live.answers()
+    next(answers), next(answers)
+    for name, facts in events(wanted(page, "/events?times=5")):
+        if name == "view":
+            assert facts["shape"] == [20, 20]
+            break
 
 
 @pytest.mark.parametrize("path", ["/etc/passwd", "/../x", "/events/", "/?x"])

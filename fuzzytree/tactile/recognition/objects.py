@@ -1,0 +1,194 @@
+"""The objects that lie on a sensor: connected regions, followed from frame to frame."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+LEAST_AREA = 2
+"""The fewest cells of an object; what is smaller is counted and left out."""
+
+MOST_OBJECTS = 16
+"""The most objects in a frame: those with the largest forces."""
+
+HYSTERESIS = 0.6
+"""The share of the votes that another answer needs to replace the one that stands."""
+
+_TOUCHING = np.ones((3, 3), np.bool_)  # at sides and corners
+_FORGOTTEN_S = 0.5
+_NO_VOTE = -2  # the key of an object that has not been seen for long enough
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Cells that press and touch each other, at sides or corners.
+
+    Attributes:
+        cells: What presses, of shape (rows, columns) of the sensor; 0 outside.
+        box: The first row and column, and those behind the last ones.
+        area: How many cells press.
+        force: The sum of what presses.
+    """
+
+    cells: npt.NDArray[np.int64]
+    box: tuple[int, int, int, int]
+    area: int
+    force: int
+
+
+def regions(
+    pressed: npt.NDArray[np.int64], least: int = LEAST_AREA
+) -> tuple[list[Region], int]:
+    """Return the regions of a frame, largest force first, and how many are left out.
+
+    Those of fewer than `least` cells are left out, and those beyond `MOST_OBJECTS`.
+
+    Args:
+        pressed: What presses on each cell, of shape (rows, columns).
+        least: The fewest cells of a region, 1 or more.
+
+    Example:
+        >>> cells = np.array([[9, 0, 0, 5], [9, 0, 0, 5], [0, 0, 0, 5], [7, 0, 0, 0]])
+        >>> found, left_out = regions(cells)
+        >>> [(one.box, one.area, one.force) for one in found], left_out
+        ([((0, 0, 2, 1), 2, 18), ((0, 3, 3, 4), 3, 15)], 1)
+    """
+    from scipy import ndimage
+
+    numbers, count = ndimage.label(pressed, _TOUCHING)
+    if not count:
+        return [], 0
+    areas = np.bincount(numbers.reshape(-1), minlength=count + 1)
+    found: list[Region] = []
+    for number, (high, wide) in enumerate(ndimage.find_objects(numbers), start=1):
+        area = int(areas[number])
+        if area < least:
+            continue
+        own = pressed if count == 1 else np.where(numbers == number, pressed, 0)
+        box = (high.start, wide.start, high.stop, wide.stop)
+        found.append(Region(own, box, area, int(own.sum())))
+    found.sort(key=lambda one: (-one.force, one.box))
+    return found[:MOST_OBJECTS], count - min(len(found), MOST_OBJECTS)
+
+
+@dataclass(slots=True)
+class _Track:
+    """An object, as it is followed.
+
+    Attributes:
+        number: From 1, in the order in which objects came.
+        row: Of the middle of its box.
+        column: The same.
+        began: When it came.
+        seen: When it was seen last.
+        votes: When it was answered how, within the time of the vote.
+        counts: How often each answer is among these.
+        key: The answer that stands.
+    """
+
+    number: int
+    row: float
+    column: float
+    began: float
+    seen: float
+    votes: deque[tuple[float, int]] = field(default_factory=deque)
+    counts: Counter[int] = field(default_factory=Counter)
+    key: int = _NO_VOTE
+
+
+class Tracker:
+    """Follows objects from frame to frame, and lets their answers vote.
+
+    The region that lies nearest to where an object was is that object, if it is not
+    farther than half of its box and two cells. An answer stands once the object has
+    been there for `seconds`; another one replaces it with `HYSTERESIS` of the votes.
+
+    Args:
+        seconds: How long votes count; 0 for the answer to each frame.
+
+    Example:
+        >>> tracker, (one,) = Tracker(1.0), regions(np.ones((2, 2), np.int64))[0]
+        >>> votes = [(0.0, 5), (0.5, 5), (1.0, 5), (1.2, 3), (1.4, 5)]
+        >>> [tracker(time, [one], [code])[0] for time, code in votes]
+        [(1, None), (1, None), (1, 5), (1, 5), (1, 5)]
+    """
+
+    def __init__(self, seconds: float = 0.0) -> None:
+        self._seconds = seconds
+        self._tracks: list[_Track] = []
+        self._last = 0
+
+    def __call__(
+        self, time: float, found: Sequence[Region], codes: Sequence[int]
+    ) -> list[tuple[int, int | None]]:
+        """Return the number and the answer of each region; None before there is one.
+
+        Args:
+            time: In seconds; it never goes back.
+            found: The regions of a frame.
+            codes: The answer to each: a class, or a number below 0 for none.
+        """
+        keep_s = max(self._seconds, _FORGOTTEN_S)
+        known = [one for one in self._tracks if time - one.seen <= keep_s]
+        pairs = sorted(
+            (distance, place, number)
+            for place, region in enumerate(found)
+            for number, track in enumerate(known)
+            if (distance := _distance(region, track)) <= _reach(region)
+        )
+        owner: dict[int, _Track] = {}
+        taken: set[int] = set()
+        for _, place, number in pairs:
+            if place not in owner and number not in taken:
+                owner[place] = known[number]
+                taken.add(number)
+        answers: list[tuple[int, int | None]] = []
+        for place, (region, code) in enumerate(zip(found, codes, strict=True)):
+            track = owner.get(place)
+            if track is None:
+                self._last += 1
+                track = _Track(self._last, 0.0, 0.0, time, time)
+                known.append(track)
+            track.row, track.column = _middle(region)
+            track.seen = time
+            answers.append((track.number, self._voted(track, time, code)))
+        self._tracks = known
+        return answers
+
+    def _voted(self, track: _Track, time: float, code: int) -> int | None:
+        if not self._seconds:
+            return code
+        track.votes.append((time, code))
+        track.counts[code] += 1
+        while time - track.votes[0][0] > self._seconds:
+            track.counts[track.votes.popleft()[1]] -= 1
+        if time - track.began < self._seconds:
+            return None
+        leader, count = max(track.counts.items(), key=lambda pair: (pair[1], -pair[0]))
+        is_first = track.key == _NO_VOTE
+        if is_first or count >= HYSTERESIS * len(track.votes):
+            track.key = leader
+        return track.key
+
+
+def _middle(region: Region) -> tuple[float, float]:
+    top, left, bottom, right = region.box
+    return (top + bottom - 1) / 2, (left + right - 1) / 2
+
+
+def _distance(region: Region, track: _Track) -> float:
+    row, column = _middle(region)
+    return math.hypot(row - track.row, column - track.column)
+
+
+def _reach(region: Region) -> float:
+    top, left, bottom, right = region.box
+    return 2.0 + max(bottom - top, right - left) / 2

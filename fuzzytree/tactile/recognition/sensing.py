@@ -1,0 +1,201 @@
+"""A sensor as a stream of answers: from a port, a recording or the simulator."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from fuzzytree.tactile.board_file import load_board
+from fuzzytree.tactile.boards import Board
+from fuzzytree.tactile.link import Connection, open_connection, room, start
+from fuzzytree.tactile.link.recording import Recorder
+from fuzzytree.tactile.recognition import frame_sources as sources
+from fuzzytree.tactile.recognition.live import Live, LiveResult
+from fuzzytree.tactile.recognition.objects import LEAST_AREA
+from fuzzytree.tactile.recognition.recogniser import usual_floor
+
+if TYPE_CHECKING:
+    from fuzzytree.files import PathLike
+    from fuzzytree.model import Model
+    from fuzzytree.tactile.recognition.live import FrameSource
+    from fuzzytree.tactile.sensor import Counters, Frame, Sensor
+
+SIMULATOR: Final = "simulator"
+"""The name of the source without any hardware."""
+
+MOST_WAITING: Final = 4
+"""Frames that wait for an answer before older ones are dropped: the newest count."""
+
+_PATIENCE_S = 2.0  # for a first frame
+
+
+class TactileSensor(contextlib.AbstractContextManager["TactileSensor"]):
+    """A sensor and a model: iterating gives what each frame shows, as it comes.
+
+    `open_sensor` makes one. It must be closed: it is a context manager.
+
+    Attributes:
+        live: Recognition, which displays can look at.
+        board: What the frames come from, as measured.
+        remarks: What is odd about the sensor at rest, in sentences.
+        recorded: The recording; None without one.
+    """
+
+    def __init__(
+        self,
+        live: Live,
+        board: Board,
+        remarks: list[str],
+        recorded: sources.Recorded | None,
+        closing: contextlib.ExitStack,
+    ) -> None:
+        self.live, self.board, self.remarks = live, board, remarks
+        self.recorded = recorded
+        self._closing = closing
+
+    def __iter__(self) -> Iterator[LiveResult]:
+        """Give what each frame shows, until no more come.
+
+        Raises:
+            PortError: If the port cannot be used any more.
+        """
+        return self.live.answers()
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """The names of the classes, in the order of strengths and probabilities."""
+        return self.live.recogniser.model.classes
+
+    @property
+    def sensor(self) -> Sensor:
+        """The sensor with its baseline and masked cells as of now."""
+        return self.live.rest.sensor
+
+    @property
+    def counters(self) -> Counters:
+        """What came in, and what was wrong with it."""
+        return self.live.source.counters
+
+    def tare(self) -> None:
+        """Take what the next 10 frames read for the baseline; from any thread."""
+        self.live.tare()
+
+    def close(self) -> None:
+        """Release the port, and end the recording."""
+        self._closing.close()
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+
+def open_sensor(
+    source: str,
+    *,
+    model: Model,
+    board: Board | PathLike | None = None,
+    reject: float | None = None,
+    vote_s: float = 0.0,
+    least_area: int = LEAST_AREA,
+    record: PathLike | None = None,
+    speed: float = 1.0,
+    seed: int = 0,
+    say: Callable[[str, str], None] | None = None,
+) -> TactileSensor:
+    """Open a sensor, measure its baseline, and begin to read frames.
+
+    Args:
+        source: A serial port, a recording, or `simulator`.
+        model: A tree or a rule base whose inputs are names of features.
+        board: What is connected to the port, or its file; none for other sources.
+        reject: The strength below which an object is unknown; the usual one if None.
+        vote_s: How long the answers to an object vote; 0 for each frame's own.
+        least_area: The fewest cells of an object.
+        record: A recording to write every frame to.
+        speed: Of a recording or the simulator; 0 for no pauses.
+        seed: Of the simulator.
+        say: Called with a word and a sentence on what is waited for.
+
+    Raises:
+        ValueError: If source and board do not go together, or a number is out of
+            range.
+        TableError: If the model's inputs are no features of frames.
+        PortError: If the port cannot be used, or frames stop before the baseline is
+            measured.
+        ReadError: If a file is none of its kind.
+        WriteError: If the recording cannot be made.
+    """
+    with contextlib.ExitStack() as stack:
+        found, used, remarks = _source(source, board, record, speed, seed, say)
+        stack.callback(found.close)
+        recorded: sources.Recorded | None = None
+        if record is not None:
+            found = recorded = sources.Recorded(found, Recorder(record, used))
+            stack.callback(recorded.end)
+            if board is not None:
+                found = sources.Newest(recorded, MOST_WAITING)
+                stack.callback(found.close)
+        live = Live(
+            model,
+            used.sensor,
+            found,
+            source,
+            reject=usual_floor(model) if reject is None else reject,
+            follow_s=used.start.follow_s,
+            vote_s=vote_s,
+            least=least_area,
+        )
+        return TactileSensor(live, used, remarks, recorded, stack.pop_all())
+    raise AssertionError  # an exit stack swallows nothing
+
+
+def _source(
+    source: str,
+    board: Board | PathLike | None,
+    record: PathLike | None,
+    speed: float,
+    seed: int,
+    say: Callable[[str, str], None] | None,
+) -> tuple[FrameSource, Board, list[str]]:
+    """Return where frames come from, the board that they fit, and remarks on it."""
+    is_file = Path(source).is_file()
+    if board is not None and (source == SIMULATOR or is_file):
+        raise ValueError(f"a board is for a port; {source} has its own")
+    if source == SIMULATOR:
+        paced = sources.Paced(sources.simulated(seed), speed)
+        return paced, sources.PAPER_BOARD, []
+    if is_file:
+        replayed = sources.Replayed(source, speed)
+        return replayed, replayed.board, []
+    if board is None:
+        text = f"{source} is no recording; for a port, name its board"
+        raise ValueError(text)
+    known = board if isinstance(board, Board) else load_board(board)
+    most = MOST_WAITING if record is None else room(known)
+    line = open_connection(known, source, most_waiting=most)
+    try:
+        count = known.start.frames
+        if count and say:
+            what = f"the baseline in {count} frames: nothing may lie on the sensor"
+            say("measures", what)
+        began = start(known, _coming(line, say))
+    except BaseException:
+        line.close()
+        raise
+    return line, began.board, began.remarks
+
+
+def _coming(
+    line: Connection, say: Callable[[str, str], None] | None
+) -> Iterator[Frame]:
+    """Give the frames of a line; say once that none comes."""
+    is_late = False
+    while line.state != "ended":
+        frame = line.take(_PATIENCE_S)
+        if frame is not None:
+            yield frame
+        elif not is_late and say:
+            is_late = True
+            say("waits", "no frame comes; Ctrl-C ends")
