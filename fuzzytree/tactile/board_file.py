@@ -34,6 +34,7 @@ from fuzzytree.tactile.boards import (
     Start,
     Text,
 )
+from fuzzytree.tactile.calibration import Calibration
 from fuzzytree.tactile.sensor import LARGEST_SIDE, Full, Sensor, Side
 
 BOARD_FORMAT: Final = "fuzzytree-board/1"
@@ -84,6 +85,7 @@ class BoardFile(FileRecord, frozen=True, kw_only=True):
     port: Port = Port()
     start: Start = Start()
     banner: Lines = 0
+    calibration: Calibration | None = None
 
 
 MOST_BYTES: Final = 4 * 2**20
@@ -150,6 +152,7 @@ checksum='none', tail='')
             port=file.port,
             start=file.start,
             banner=file.banner,
+            calibration=file.calibration,
         )
     except InvalidModelError as error:
         mistakes += error.mistakes
@@ -200,7 +203,20 @@ def board_text(board: Board) -> str:
         entries["start"] = Short(_changed(board.start))
     if board.banner:
         entries["banner"] = Noted(board.banner, "lines")
+    if board.calibration:
+        entries["calibration"] = _calibration_entry(board.calibration)
     return joined(board.name, _TITLE, entries).decode()
+
+
+def _calibration_entry(law: Calibration) -> Entry:
+    points: list[Entry] = [Short([*point]) for point in law.points]
+    entries: dict[str, Entry] = {
+        "unit": law.unit,
+        "points": Short(points, is_run_on=True),
+    }
+    if law.gains:
+        entries["gains"] = Short([*law.gains], is_run_on=True)
+    return entries
 
 
 def _sensor_entry(sensor: Sensor) -> Entry:

@@ -10,6 +10,7 @@ from msgspec import Meta, field
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats import FileRecord
 from fuzzytree.model import Mistake, Value
+from fuzzytree.tactile.calibration import Calibration
 from fuzzytree.tactile.sensor import Sensor, limit_mistakes
 
 HEXADECIMAL: Final = "[0-9A-Fa-f]{2}( ?[0-9A-Fa-f]{2}){0,63}"
@@ -196,6 +197,7 @@ class Board(Value, frozen=True):
         start: What is measured at the beginning.
         banner: Lines of text at the beginning, ended by a line feed, that are no
             frames.
+        calibration: What makes pressures of readings; readings stay without one.
 
     Raises:
         InvalidModelError: If the parts contradict each other; it lists everything.
@@ -209,6 +211,7 @@ class Board(Value, frozen=True):
     port: Port = Port()
     start: Start = Start()
     banner: Lines = 0
+    calibration: Calibration | None = None
 
     def __post_init__(self) -> None:
         """Refuse a board that contradicts itself."""
@@ -226,6 +229,10 @@ def _mistakes(board: Board) -> Iterator[Mistake]:
     for name, part in parts.items():
         yield from (((name, *path), text) for path, text in limit_mistakes(part))
     protocol, full = board.protocol, board.sensor.full
+    cells = board.sensor.rows * board.sensor.columns
+    if board.calibration and len(board.calibration.gains) not in (0, cells):
+        text = f"a calibration has {cells} gains, not {len(board.calibration.gains)}"
+        yield ("calibration", "gains"), text
     if isinstance(protocol, Sentinel):
         if protocol.end == protocol.zero:
             text = f"{protocol.end} cannot both end a frame and begin a run"

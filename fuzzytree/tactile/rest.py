@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import msgspec
 import numpy as np
 
+from fuzzytree.tactile.calibration import STEPS, Calibration
 from fuzzytree.tactile.sensor import Cells, Sensor, check_frames, is_masked
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ class Rest:
         sensor: With the baseline and the masked cells that are known.
         follow_s: Seconds in which the baseline follows 63 % of a change; 0 for a
             baseline, and masked cells, that stay as they are.
+        calibration: What makes pressures of readings; without one they stay.
         hot_s: Seconds for which a single cell presses before it is hot.
 
     Attributes:
@@ -83,11 +85,20 @@ class Rest:
     """
 
     def __init__(
-        self, sensor: Sensor, follow_s: float = FOLLOW_S, *, hot_s: float = HOT_S
+        self,
+        sensor: Sensor,
+        follow_s: float = FOLLOW_S,
+        calibration: Calibration | None = None,
+        *,
+        hot_s: float = HOT_S,
     ) -> None:
         self._sensor, self._follow_s, self._hot_s = sensor, follow_s, hot_s
         shape = (sensor.rows, sensor.columns)
         self.bare = Sensor(*shape, full=sensor.full)
+        self._calibration = calibration
+        if calibration is not None:
+            top = calibration.top(sensor.full)
+            self.bare = Sensor(*shape, STEPS, top=top, unit=calibration.unit)
         self._baseline = np.zeros(shape)
         if sensor.baseline:
             self._baseline += np.array(sensor.baseline).reshape(shape)
@@ -129,7 +140,7 @@ class Rest:
         return news
 
     def __call__(self, frame: Cells, time: float) -> npt.NDArray[np.int64]:
-        """Return what presses on each cell, of shape (rows, columns).
+        """Return what presses on each cell, of shape (rows, columns), for `bare`.
 
         Args:
             frame: Of shape (rows, columns), as the board sent it.
@@ -151,6 +162,8 @@ class Rest:
         before, self._time = self._time, time
         passed_s = 0.0 if before is None else min(max(time - before, 0.0), _LONGEST_S)
         self._waiting = cells, values, found > 0, passed_s
+        if self._calibration is not None:
+            return self._calibration.steps(found, sensor.full)
         return found
 
     def follow(self) -> None:

@@ -40,6 +40,8 @@ class Sensor(Value, frozen=True):
         threshold: A cell is pressed where it reads more than this over its baseline.
         baseline: What each cell reads when nothing presses, row by row; empty for 0.
         masked: The (row, column), from 0, of cells that are dead or hot: always 0.
+        top: The pressure of a cell that reads full, in `unit`; 1 unless calibrated.
+        unit: Of pressures; empty for shares of full.
 
     Raises:
         InvalidModelError: If the parts contradict each other; it lists everything.
@@ -51,6 +53,13 @@ class Sensor(Value, frozen=True):
     threshold: int = 0
     baseline: tuple[int, ...] = ()
     masked: tuple[tuple[int, int], ...] = ()
+    top: float = 1.0
+    unit: str = ""
+
+    @property
+    def range_text(self) -> str:
+        """What full means, for people: a reading, or a pressure with its unit."""
+        return f"{self.top:.4g} {self.unit}" if self.unit else str(self.full)
 
     def __post_init__(self) -> None:
         """Refuse a sensor that contradicts itself."""

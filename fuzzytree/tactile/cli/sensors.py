@@ -76,7 +76,11 @@ def _sensor_of_board(board: str, names: str, others: Sequence[object]) -> Sensor
 
     if any(one is not None for one in others):
         raise click.UsageError(f"--board sets {names} --threshold; choose one of them")
-    return load_board(board).sensor
+    known = load_board(board)
+    if known.calibration is not None:
+        text = "frames are read without a calibration here; name a board without one"
+        raise click.UsageError(f"{board} is calibrated, and {text}")
+    return known.sensor
 
 
 def frames_of_options(

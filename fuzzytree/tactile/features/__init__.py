@@ -178,8 +178,13 @@ class _Maker:
         return self._parts[name]
 
     def _scaled(self, value: Place, degree: int, feature: Feature) -> Place:
-        """Return a value of some degree in g, for g in [0, 1] or divided by its sum."""
+        """Return a value of some degree in g, a share of full or a pressure.
+
+        Or in g divided by its sum, which has no unit.
+        """
         unit: Place | float = float(self.sensor.full**degree)
+        if self.sensor.top != 1.0:
+            unit = (self.sensor.full / self.sensor.top) ** degree
         if feature.per_force:
             unit = self.make.chain("multiply", [self.moments.total] * degree)
         return value / unit

@@ -25,7 +25,8 @@ from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model import Model
+    from fuzzytree.model import FloatArray, Model
+    from fuzzytree.tactile.calibration import Calibration
 
 STATES = {state: state.name.lower() for state in State}
 """The word for each state in lines and JSON."""
@@ -117,6 +118,15 @@ class SensorObject:
         """Where the longer axis points to, in degrees counterclockwise from x."""
         return self._place[2]
 
+    @property
+    def force(self) -> float:
+        """The sum of its pressures: in cells that read full, or in the sensor's unit.
+
+        As the feature of this name.
+        """
+        sensor = self.recogniser.sensor
+        return self.region.force * sensor.top / sensor.full
+
     @functools.cached_property
     def probabilities(self) -> tuple[float, ...]:
         """The probabilities of the classes.
@@ -136,8 +146,10 @@ class LiveResult:
 
     Attributes:
         frame: As the board sent it.
-        cells: What presses, of shape (rows, columns), without the baseline; None if
-            the frame does not fit.
+        cells: What presses, of shape (rows, columns), without the baseline: readings,
+            or steps of `sensor.top / sensor.full` of a calibrated sensor; None if the
+            frame does not fit.
+        sensor: Of the cells.
         objects: What lies there, the largest force first.
         left_out: How many regions are too small for an object.
         saturated: How many cells take no more.
@@ -148,6 +160,7 @@ class LiveResult:
 
     frame: Frame
     cells: npt.NDArray[np.int64] | None
+    sensor: Sensor
     objects: tuple[SensorObject, ...]
     left_out: int
     saturated: int
@@ -159,6 +172,14 @@ class LiveResult:
     def time(self) -> float:
         """When the last byte of the frame came, in seconds since the beginning."""
         return self.frame.time
+
+    @property
+    def pressures(self) -> FloatArray | None:
+        """What presses, of shape (rows, columns): shares of full, or in its unit."""
+        if self.cells is None:
+            return None
+        scale = self.sensor.top / self.sensor.full
+        return scale * self.cells.astype(np.float64)
 
     @property
     def state(self) -> State | None:
@@ -211,7 +232,7 @@ class LiveView:
         source: The name of what the frames come from.
         model: The name of the model.
         classes: The names of the classes.
-        full: What a cell reads that takes no more.
+        sensor: Of the answers' cells.
         answer: To the last frame; None before the first.
         rate: Answers a second, lately, and of all frames once it is over; 0 before
             the second.
@@ -226,7 +247,7 @@ class LiveView:
     source: str
     model: str
     classes: tuple[str, ...]
-    full: int
+    sensor: Sensor
     answer: LiveResult | None
     rate: float
     latency: Latency | None
@@ -251,6 +272,7 @@ class Live:
         name: That of the source.
         reject: The floor of the strength, as of `Recogniser`.
         follow_s: In how many seconds the baseline follows; 0 to keep it.
+        calibration: What makes pressures of readings.
         vote_s: How long the answers to an object vote; 0 for each frame's own.
         least: The fewest cells of an object.
 
@@ -268,11 +290,12 @@ class Live:
         *,
         reject: float = 0.0,
         follow_s: float = FOLLOW_S,
+        calibration: Calibration | None = None,
         vote_s: float = 0.0,
         least: int = LEAST_AREA,
     ) -> None:
         self.source, self.name = source, name
-        self.rest = Rest(sensor, follow_s)
+        self.rest = Rest(sensor, follow_s, calibration)
         self.recogniser = Recogniser(model, self.rest.bare, reject)
         self._least, self._tracker = least, Tracker(vote_s)
         self._tare_wanted = threading.Event()
@@ -326,7 +349,7 @@ class Live:
             self.name,
             model.name,
             model.classes,
-            sensor.full,
+            sensor,
             answer,
             self._rate(),
             self._latency(),
@@ -343,7 +366,9 @@ class Live:
         except TableError as error:  # of another size: the next one may fit
             self._refused += 1
             late = self.source.now() - frame.time
-            return LiveResult(frame, None, (), 0, 0, late, str(error), ())
+            return LiveResult(
+                frame, None, self.rest.bare, (), 0, 0, late, str(error), ()
+            )
         found, left_out = regions(cells, self._least)
         self.left_out += left_out
         objects = self._recognised(frame.time, found)
@@ -352,7 +377,10 @@ class Live:
         trouble = f"{some} no more: the frame is saturated" if count else ""
         late = self.source.now() - frame.time
         events = tuple(self.rest.news())
-        return LiveResult(frame, cells, objects, left_out, count, late, trouble, events)
+        bare = self.rest.bare
+        return LiveResult(
+            frame, cells, bare, objects, left_out, count, late, trouble, events
+        )
 
     def _recognised(
         self, time: float, found: Sequence[Region]

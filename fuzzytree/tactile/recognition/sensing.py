@@ -144,6 +144,7 @@ def open_sensor(
             source,
             reject=usual_floor(model) if reject is None else reject,
             follow_s=used.start.follow_s,
+            calibration=used.calibration,
             vote_s=vote_s,
             least=least_area,
         )

@@ -192,7 +192,9 @@ def whereabouts(found: SensorObject) -> str:
 
     From the middle of the sensor, to the right and upwards.
     """
-    return f"centre {found.x:+.1f}, {found.y:+.1f}; {found.region.area} cells"
+    unit = found.recogniser.sensor.unit
+    force = f"; force {found.force:.3g} {unit}" if unit else ""
+    return f"centre {found.x:+.1f}, {found.y:+.1f}; {found.region.area} cells{force}"
 
 
 def event_text(event: RestEvent) -> str:
@@ -243,8 +245,9 @@ def screen(
     drawn: list[str] = []
     cells = view.answer.cells if view.answer else None
     if cells is not None:
-        drawn = picture(cells, view.full, beside, above - 1, look=look, times=times)
-        drawn.append(_legend(view.full, drawn, look=look))
+        full = view.sensor.full
+        drawn = picture(cells, full, beside, above - 1, look=look, times=times)
+        drawn.append(_legend(view.sensor.range_text, drawn, look=look))
     facts = _facts(view, room if is_wide else room - len(drawn), look=look)
     body = _side_by_side(drawn, facts) if is_wide else [*drawn, *facts]
     footer = [
@@ -255,7 +258,7 @@ def screen(
     return "\n".join([title, *body[:room], "", *footer][:lines])
 
 
-def _legend(full: int, drawn: Sequence[str], *, look: Look) -> str:
+def _legend(full: str, drawn: Sequence[str], *, look: Look) -> str:
     """Return the colours of 0 to full in a line as wide as a picture."""
     width = drawn[0].count("▀") or len(drawn[0])
     low, high = "0 ", f" {full}"
@@ -352,7 +355,7 @@ def line_facts(answer: LiveResult) -> list[dict[str, object]]:
             "y": round(one.y, 3),
             "angle": round(one.angle, 3),
             "area": one.region.area,
-            "force": one.region.force,
+            "force": round(one.force, 4),
             "box": one.box,
         }
         for one in answer.objects

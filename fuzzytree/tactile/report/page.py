@@ -265,7 +265,7 @@ def hello_facts(view: LiveView) -> dict[str, object]:
         "source": view.source,
         "model": view.model,
         "classes": view.classes,
-        "full": view.full,
+        "full": view.sensor.range_text,
         "palette": PALETTE,
     }
 
@@ -301,7 +301,7 @@ def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object
 
 
 def _points(view: LiveView, cells: Cells, times: int) -> dict[str, object]:
-    points = shades(cells, view.full, times)
+    points = shades(cells, view.sensor.full, times)
     packed = base64.b64encode(points.tobytes()).decode()
     return {"shape": points.shape, "points": packed}
 

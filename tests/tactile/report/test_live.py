@@ -53,7 +53,17 @@ SOFT = SensorObject(
         Sensor(2, 3),
     ),
 )
-ANSWER = LiveResult(Frame(CELLS, 1.25, 55), CELLS, (SOFT,), 0, 1, 4e-4, "a cell", ())
+ANSWER = LiveResult(
+    frame=Frame(CELLS, 1.25, 55),
+    cells=CELLS,
+    sensor=Sensor(2, 3),
+    objects=(SOFT,),
+    left_out=0,
+    saturated=1,
+    latency_s=4e-4,
+    trouble="a cell",
+    events=(),
+)
 
 
 def showing(**changes: object) -> LiveResult:
@@ -66,7 +76,7 @@ VIEW = LiveView(
     source="/dev/ttyUSB0",
     model="grip",
     classes=("firm", "soft"),
-    full=255,
+    sensor=Sensor(2, 3),
     answer=ANSWER,
     rate=43.96,
     latency=Latency(4e-4, 9e-4, 2e-3),
@@ -179,7 +189,7 @@ def test_no_name_of_a_class_controls_the_terminal() -> None:
 
 
 def test_a_line_has_twelve_fields_between_tabs() -> None:
-    place = "3\t0.159\t-0.405\t31.957\t4\t315\t0,1,2,3"
+    place = "3\t0.159\t-0.405\t31.957\t4\t1.2353\t0,1,2,3"
     assert lines(ANSWER) == f"1.25\t55\tobject\tsoft\t0.75\t1\t{place}"
     unknown = showing(state=State.UNKNOWN, code=-1, label="")
     assert lines(unknown) == f"1.25\t55\tunknown\t\t0.75\t1\t{place}"
