@@ -134,6 +134,17 @@ class Rest:
         """Let the next frames, 1 or more, be the baseline: their median."""
         self._tared, self._tare_frames = [], frames
 
+    def restart(self, sensor: Sensor) -> None:
+        """Take the baseline and the masked cells of a sensor, as after a tare."""
+        self._waiting = None
+        self._baseline[:] = 0.0
+        if sensor.baseline:
+            self._baseline += np.array(sensor.baseline).reshape(self._baseline.shape)
+        self._is_masked = is_masked(sensor)
+        self._is_free = ~self._is_masked
+        self._below[:] = 0
+        self._alone_s[:] = 0.0
+
     def news(self) -> list[RestEvent]:
         """Return what has changed since the last time."""
         news, self._events = self._events, []

@@ -28,7 +28,7 @@ from fuzzytree.tactile.link.sentinels import SentinelDecoder
 from fuzzytree.tactile.link.starting import measured, remarks
 from fuzzytree.tactile.link.texts import TextDecoder
 from fuzzytree.tactile.link.watching import PATIENCE_S, RequestTimer, Watch
-from fuzzytree.tactile.sensor import Cells, Counters, Frame
+from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -212,6 +212,11 @@ class Connection(contextlib.AbstractContextManager["Connection"]):
         """What has been counted up to now: a copy."""
         with self._news:
             return Counters(*astuple(self._counted))
+
+    @property
+    def sensor(self) -> Sensor | None:
+        """None: a line states nothing anew."""
+        return None
 
     @property
     def trouble(self) -> str:

@@ -26,11 +26,21 @@ from fuzzytree.errors import ReadError, TableError, WriteError
 from fuzzytree.files import PathLike, reason, write_atomically
 from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.link.starting import still
-from fuzzytree.tactile.sensor import Cells, Counters, Frame, check_frames
+from fuzzytree.tactile.sensor import (
+    Cells,
+    Counters,
+    Frame,
+    Sensor,
+    check_frames,
+    is_masked,
+)
 
 MAGIC: Final = b"\x89FTR\r\n\x1a\n"
 MARK: Final = b"\xf5fr\n"
-VERSION: Final = 1
+REST: Final = b"\xf5rs\n"
+"""What a record begins with that says what the cells read at rest from then on."""
+VERSIONS: Final = (1, 2)
+"""The layouts that are read; the last one is written. The first has no such records."""
 LARGEST_BOARD: Final = 4 * 2**20
 """The most bytes that the text of a board may have."""
 
@@ -79,11 +89,13 @@ def header(board: Board, started_ns: int) -> bytes:
     return content + crc(content)
 
 
-def fixed_part(board: Board, board_bytes: int, started_ns: int) -> bytes:
+def fixed_part(
+    board: Board, board_bytes: int, started_ns: int, version: int = VERSIONS[-1]
+) -> bytes:
     """Return the part of the header that is of the same length in every file."""
     fields = (
         MAGIC,
-        VERSION,
+        version,
         board.sensor.rows,
         board.sensor.columns,
         board.sensor.dtype.itemsize,
@@ -117,15 +129,37 @@ def _packed(frame: Frame, counters: Counters, board: Board) -> bytes:
     if cells.min() < 0 or cells.max() > largest:
         wrong = cells.min() if cells.min() < 0 else cells.max()
         raise TableError(f"a cell lies in 0 to {largest}, not {wrong}")
+    return _record(MARK, frame, counters, cells, board)
+
+
+def _record(
+    mark: bytes, frame: Frame, counters: Counters, cells: Cells, board: Board
+) -> bytes:
     time_ns = round(frame.time * _NS)
-    values = (MARK, frame.number, time_ns, astuple(counters), cells, 0)
+    values = (mark, frame.number, time_ns, astuple(counters), cells, 0)
     content = np.array(values, layout_of(board)).tobytes()[:-4]
     return content + crc(content)
 
 
+def _rest_cells(sensor: Sensor) -> Cells:
+    """Return what cells read at rest as a frame; masked cells read the largest."""
+    shape = (sensor.rows, sensor.columns)
+    baseline = np.array(sensor.baseline or [0] * math.prod(shape)).reshape(shape)
+    return np.where(is_masked(sensor), sensor.largest, baseline)
+
+
+def _rest_sensor(sensor: Sensor, cells: Cells) -> Sensor:
+    """Return a sensor with what its cells read at rest."""
+    is_hot = cells >= sensor.largest
+    found = np.where(is_hot, 0, np.minimum(cells, sensor.full)).astype(np.int64)
+    masked = tuple((int(row), int(column)) for row, column in np.argwhere(is_hot))
+    baseline = tuple(found.reshape(-1).tolist()) if found.any() else ()
+    return msgspec.structs.replace(sensor, baseline=baseline, masked=masked)
+
+
 def _unpacked(content: bytes, layout: np.dtype[np.void]) -> FrameRecord | None:
     """Return a record, or None if the bytes are none, or a damaged one."""
-    if not content.startswith(MARK) or content[-4:] != crc(content[:-4]):
+    if not content.startswith((MARK, REST)) or content[-4:] != crc(content[:-4]):
         return None
     fields = np.frombuffer(content, layout)[0]
     counters, time_ns = fields["counters"].tolist(), int(fields["time_ns"])
@@ -229,7 +263,9 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
             TableError: If the frame is of another size, or a cell has no place.
             WriteError: If it cannot be written; all frames before it are kept.
         """
-        content = _packed(frame, counters, self._board)
+        self._append(_packed(frame, counters, self._board))
+
+    def _append(self, content: bytes) -> None:
         self._raise_failure()
         rest = memoryview(content)
         try:
@@ -241,6 +277,15 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
             self._written += 1
             self.most_at_risk = max(self.most_at_risk, self._written - self._kept)
             self._wake.notify()
+
+    def write_rest(self, sensor: Sensor, frame: Frame, counters: Counters) -> None:
+        """Append what the cells read at rest, from the frame after this one on.
+
+        Raises:
+            WriteError: If it cannot be written; all frames before it are kept.
+        """
+        cells = _rest_cells(sensor)
+        self._append(_record(REST, frame, counters, cells, self._board))
 
     def close(self) -> None:
         """Wait until the disk has all of it, and close the file.
@@ -293,6 +338,8 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
 
     Attributes:
         board: What sent the frames.
+        sensor: That of the board; while frames are given, with what the cells read at
+            rest since the last tare, hot or dead cell.
         started_ns: When the recording began, in nanoseconds since 1970 (UTC).
         most_frames: How many records the file has room for.
         damaged: Records that were damaged, of those that were passed.
@@ -322,6 +369,7 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
         """
         self.damaged = self.cut_bytes = lost = passed = tried = 0
         length, place, window = self._layout.itemsize, self._begin, b""
+        self.sensor = self.board.sensor
         while chunk := self._read(place, min(_CHUNK, self._end - place)):
             place += len(chunk)
             window += chunk
@@ -330,14 +378,26 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
                 if record := _unpacked(window[at : at + length], self._layout):
                     self.damaged += -(-lost // length)  # rounded up
                     lost = 0
+                    is_rest = window.startswith(REST, at)
                     at += length
-                    yield record
+                    if is_rest:
+                        cells = record.frame.cells
+                        self.sensor = _rest_sensor(self.board.sensor, cells)
+                    else:
+                        yield record
                     continue
                 # A file made to be slow has a mark everywhere, and each is tried.
-                tried += length if window.startswith(MARK, at) else 0
+                tried += length if window.startswith((MARK, REST), at) else 0
                 if tried > _PATIENCE * (passed + at) + _TRIES_BYTES:
                     raise ReadError(f"{self._name}: is damaged all over")
-                after = window.find(MARK, at + 1)
+                after = min(
+                    (
+                        k
+                        for k in (window.find(m, at + 1) for m in (MARK, REST))
+                        if k > 0
+                    ),
+                    default=-1,
+                )
                 if after < 0:
                     after = max(len(window) - len(MARK) + 1, at + 1)
                 lost += after - at
@@ -369,10 +429,10 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
         if not fixed.startswith(MAGIC) or len(fixed) < size:
             raise ReadError(f"{name}: is no recording of a board")
         head = np.frombuffer(fixed, FIXED)[0]
-        if head["version"] != VERSION:
+        if head["version"] not in VERSIONS:
             raise ReadError(
                 f"{name}: is a recording of version {head['version']}; "
-                f"this program reads version {VERSION}"
+                f"this program reads versions {', '.join(map(str, VERSIONS))}"
             )
         length = int(head["board_bytes"])
         self.started_ns = int(head["started_ns"])
@@ -384,10 +444,12 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
             self.board = msgspec.json.decode(text, type=Board)
         except (msgspec.MsgspecError, UnicodeDecodeError) as error:
             raise ReadError(f"{name}: its board cannot be read: {error}") from error
-        if fixed != fixed_part(self.board, length, self.started_ns):
+        version = int(head["version"])
+        if fixed != fixed_part(self.board, length, self.started_ns, version):
             raise ReadError(f"{name}: its header contradicts its board")
         self._begin = size + len(rest)
         self._layout = layout_of(self.board)
+        self.sensor = self.board.sensor
 
 
 def read_recording(path: PathLike) -> Recording:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -57,6 +57,11 @@ class Paced:
         self.counters = Counters()
 
     @property
+    def sensor(self) -> Sensor | None:
+        """None: what is known beforehand is stated once."""
+        return None
+
+    @property
     def trouble(self) -> str:
         """Empty: what is known beforehand comes."""
         return ""
@@ -106,6 +111,11 @@ class Replayed(Paced):
         self.board = self._file.board
 
     @property
+    def sensor(self) -> Sensor | None:
+        """What the cells read at rest since a tare, a hot or a dead cell."""
+        return self._file.sensor
+
+    @property
     def trouble(self) -> str:
         """A sentence if records were damaged; empty if none was."""
         count = self._file.damaged
@@ -131,7 +141,13 @@ class Recorded:
     def __init__(self, source: FrameSource, recorder: Recorder) -> None:
         self._source, self._recorder = source, recorder
         self.written, self.failure = 0, ""
+        self._writing = threading.Lock()  # frames and rests come from two threads
         self.now, self.close = source.now, source.close
+
+    @property
+    def sensor(self) -> Sensor | None:
+        """What the source states."""
+        return self._source.sensor
 
     @property
     def counters(self) -> Counters:
@@ -146,13 +162,27 @@ class Recorded:
     def __iter__(self) -> Iterator[Frame]:
         """Give the frames."""
         for frame in self._source:
-            if not self.failure:
-                try:
-                    self._recorder.write(frame, self._source.counters)
-                    self.written += 1
-                except WriteError as error:
-                    self.failure = f"the recording ended: {error}"
+            counters = self._source.counters
+            if self._keep(lambda: self._recorder.write(frame, counters)):  # noqa: B023
+                self.written += 1
             yield frame
+
+    def rest(self, sensor: Sensor, frame: Frame) -> None:
+        """Record what the cells read at rest, as found in a frame."""
+        counters = self._source.counters
+        self._keep(lambda: self._recorder.write_rest(sensor, frame, counters))
+
+    def _keep(self, write: Callable[[], None]) -> bool:
+        """Write unless the recording has ended; note why it ends now."""
+        with self._writing:
+            if self.failure:
+                return False
+            try:
+                write()
+            except WriteError as error:
+                self.failure = f"the recording ended: {error}"
+                return False
+            return True
 
     def end(self) -> None:
         """End the recording, once no more frames come."""
@@ -179,6 +209,11 @@ class Newest:
         self.now = source.now
         self._thread = threading.Thread(target=self._read, name="newest", daemon=True)
         self._thread.start()
+
+    @property
+    def sensor(self) -> Sensor | None:
+        """What the source states."""
+        return self._source.sensor
 
     @property
     def counters(self) -> Counters:

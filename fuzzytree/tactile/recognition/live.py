@@ -56,6 +56,11 @@ class FrameSource(Protocol):
         """A sentence about why no frame comes; empty if frames come."""
         ...
 
+    @property
+    def sensor(self) -> Sensor | None:
+        """What the cells read at rest, where the source states it anew."""
+        ...
+
     def __iter__(self) -> Iterator[Frame]:
         """Give frames as they come."""
         ...
@@ -295,6 +300,7 @@ class Live:
         least: int = LEAST_AREA,
     ) -> None:
         self.source, self.name = source, name
+        self._sensor, self._stated = sensor, source.sensor
         self.rest = Rest(sensor, follow_s, calibration)
         self.recogniser = Recogniser(model, self.rest.bare, reject)
         self._least, self._tracker = least, Tracker(vote_s)
@@ -319,6 +325,9 @@ class Live:
         """Give an answer for each frame, `most` of them, or until there are no more."""
         try:
             for frame in itertools.islice(self.source, most):
+                if self.source.sensor is not self._stated:
+                    self._stated = self.source.sensor
+                    self.rest.restart(self._stated or self._sensor)
                 if self._tare_wanted.is_set():
                     self._tare_wanted.clear()
                     self.rest.tare()

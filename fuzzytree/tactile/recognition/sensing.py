@@ -61,7 +61,17 @@ class TactileSensor(contextlib.AbstractContextManager["TactileSensor"]):
         Raises:
             PortError: If the port cannot be used any more.
         """
-        return self.live.answers()
+        return self.answers()
+
+    def answers(self, most: int | None = None) -> Iterator[LiveResult]:
+        """Give what each frame shows, of `most` frames.
+
+        What changes in what the cells read at rest goes to the recording.
+        """
+        for answer in self.live.answers(most):
+            if answer.events and self.recorded is not None:
+                self.recorded.rest(self.sensor, answer.frame)
+            yield answer
 
     @property
     def classes(self) -> tuple[str, ...]:

@@ -35,6 +35,7 @@ class Shown:
     def __init__(self) -> None:
         self.counters = Counters()
         self.trouble = ""
+        self.sensor = None
         self._begin = time.monotonic()
         self._cells: queue.Queue[Cells | None] = queue.Queue()
 

@@ -78,7 +78,7 @@ def test_the_layout_is_that_of_the_page(tmp_path: Path) -> None:
     """Read a file with nothing but what `docs/reference/recordings.md` says."""
     content = _record(tmp_path / "a.ftr", 2)
     assert content[:8] == b"\x89FTR\r\n\x1a\n"
-    assert np.frombuffer(content, "<u2", 3, 8).tolist() == [1, 3, 4]
+    assert np.frombuffer(content, "<u2", 3, 8).tolist() == [2, 3, 4]
     assert list(content[14:16]) == [1, 9]
     record, text = np.frombuffer(content, "<u4", 2, 16).tolist()
     assert int.from_bytes(content[24:32], "little") == 1_000
@@ -216,8 +216,8 @@ def _header(text: bytes, **changes: int) -> bytes:
         (records.MAGIC, "is no recording of a board"),
         (b"time,number\n" * 9, "is no recording of a board"),
         (
-            _header(b"{}", version=2),
-            "is a recording of version 2; this program reads version 1",
+            _header(b"{}", version=3),
+            "is a recording of version 3; this program reads versions 1, 2",
         ),
         (_header(b"{}", board_bytes=2**32 - 1), "its header is damaged"),
         (_header(b"{}"), "its board cannot be read: Object missing required field `na"),
@@ -411,3 +411,35 @@ def test_a_recorder_killed_at_any_moment_has_written_all_it_took(
 ) -> None:
     path = tmp_path / "a.ftr"
     _check_killed(path, _killed(path, moment * 7, moment * 0.0007))
+
+
+def test_a_recording_of_the_first_layout_is_read(tmp_path: Path) -> None:
+    content = bytearray(_record(tmp_path / "a.ftr", 2))
+    text = int.from_bytes(content[20:24], "little")
+    content[8] = 1
+    content[32 + text : 36 + text] = records.crc(bytes(content[: 32 + text]))
+    found = _read(tmp_path / "b.ftr", bytes(content))
+    assert found.frames.tolist() == _frames(2).tolist()
+
+
+def test_what_cells_read_at_rest_since_a_frame_is_in_the_recording(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.ftr"
+    tared = msgspec.structs.replace(
+        BOARD.sensor, baseline=tuple(range(12)), masked=((1, 2), (2, 0))
+    )
+    counters = Counters(frames=1)
+    with Recorder(path, BOARD, started_ns=0) as recorder:
+        for number, cells in enumerate(_frames(3)):
+            frame = Frame(cells, number / 8, number)
+            recorder.write(frame, counters)
+            if number == 1:
+                recorder.write_rest(tared, frame, counters)
+    with records.RecordingFile(path) as file:
+        sensors = [file.sensor for _ in file]
+        assert (file.damaged, file.cut_bytes) == (0, 0)
+    expected = tuple(0 if place in (6, 8) else place for place in range(12))
+    assert sensors[:2] == [BOARD.sensor] * 2
+    assert (sensors[2].baseline, sensors[2].masked) == (expected, tared.masked)
+    assert records.read_recording(path).frames.tolist() == _frames(3).tolist()

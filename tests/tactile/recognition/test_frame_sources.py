@@ -10,11 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fuzzytree as ft
 from fuzzytree.errors import WriteError
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link import Connection, open_connection
 from fuzzytree.tactile.link.recording import FrameRecord, Recorder, read_recording
-from fuzzytree.tactile.recognition.frame_sources import Newest, Paced, Recorded
+from fuzzytree.tactile.recognition.frame_sources import (
+    Newest,
+    Paced,
+    Recorded,
+    Replayed,
+)
+from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.device import Wire
 from fuzzytree.tactile.simulation.encoding import encoded
@@ -152,3 +159,32 @@ def test_a_full_disk_ends_the_recording_and_the_frames_go_on(
     recorded.end()
     assert recorded.written == 3
     assert len(read_recording(tmp_path / "a.ftr").frames) == 3
+
+
+def test_a_tare_and_a_hot_cell_are_in_the_recording_and_hold_when_it_is_played(
+    tmp_path: Path,
+) -> None:
+    path, areas = tmp_path / "a.ftr", np.array([[4.0], [5.0], [16.0], [15.0]])
+    tree = ft.learn(ft.table(areas, columns=["area"]), target=["s", "s", "l", "l"])
+    cells = np.zeros((60, 4, 4), np.int64)
+    cells[:, :2, :2] = 90  # lies there at the beginning, and is tared away
+    cells[12:, 3, 3] = 60  # hot from there on
+    coming = (
+        FrameRecord(Frame(one, 0.1 * k, k), Counters(frames=k + 1))
+        for k, one in enumerate(cells)
+    )
+    recorded = Recorded(Paced(coming, 0.0), Recorder(path, BOARD))
+    live = Live(tree, BOARD.sensor, recorded, "x")
+    live.tare()
+    for answer in live.answers():
+        if answer.events:
+            recorded.rest(live.rest.sensor, answer.frame)
+    recorded.end()
+    again = Replayed(path, 0.0)
+    played = Live(tree, again.board.sensor, again, "again")
+    answers = list(played.answers())
+    assert [one.label for one in answers[:9]] == ["s"] * 9
+    assert {one.label for one in answers[10:]} == {""}
+    assert played.rest.sensor.masked == ((3, 3),)
+    found = [event.kind for one in answers for event in one.events]
+    assert found == ["hot"]  # it is found again, and the tare is only recorded
