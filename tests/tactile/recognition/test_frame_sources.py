@@ -183,6 +183,7 @@ def test_a_tare_and_a_hot_cell_are_in_the_recording_and_hold_when_it_is_played(
     again = Replayed(path, 0.0)
     played = Live(tree, again.board.sensor, again, "again")
     answers = list(played.answers())
+    again.close()
     assert [one.label for one in answers[:9]] == ["s"] * 9
     assert {one.label for one in answers[10:]} == {""}
     assert played.rest.sensor.masked == ((3, 3),)
