@@ -38,7 +38,7 @@ for form in all_formats():
 """
 
 
-SLOW = ("c", "fcl", "fis", "onnx")
+SLOW = ("c", "fcl", "fis", "fml", "onnx")
 """Formats that take seconds: a compiler, sessions, many curves of points."""
 
 
