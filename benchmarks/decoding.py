@@ -12,11 +12,11 @@ import time
 from typing import Final
 
 import numpy as np
+from simulated_board import encoded
 
 from fuzzytree.tactile.boards import Board, Marker, Protocol, Request, Sentinel, Text
 from fuzzytree.tactile.link import decoder_of
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulation.encoding import encoded
 
 PIECE: Final = 4096
 FRAMES: Final = 500

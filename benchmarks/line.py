@@ -17,11 +17,11 @@ import time
 import tty
 from multiprocessing.connection import Connection
 
+from simulated_board import blob, encoded
+
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link import open_connection
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulation.device import blob
-from fuzzytree.tactile.simulation.encoding import encoded
 
 BOARD = Board("mat", Sensor(16, 16), Marker("AA 55", checksum="crc16"))
 

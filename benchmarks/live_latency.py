@@ -24,6 +24,7 @@ from multiprocessing.sharedctypes import SynchronizedArray
 from pathlib import Path
 
 import numpy as np
+from simulated_board import Wire, encoded
 
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
@@ -35,8 +36,6 @@ from fuzzytree.tactile.link import open_connection
 from fuzzytree.tactile.recognition.frame_sources import PAPER_BOARD, simulated
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.runtimes.frames import features_of
-from fuzzytree.tactile.simulation.device import Wire
-from fuzzytree.tactile.simulation.encoding import encoded
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import press
 

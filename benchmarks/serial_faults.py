@@ -1,6 +1,6 @@
 """Faults of a serial connection for tests: damaged bytes, noise and wrong baud rates.
 
-`FaultyDevice` is the simulated board of `tactile simulate` with these faults.
+`FaultyDevice` is the board of `simulated_board.py` with these faults.
 """
 
 from __future__ import annotations
@@ -17,11 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
-
-from fuzzytree.errors import InvalidModelError
-from fuzzytree.tactile.boards import Board, Marker, Port
-from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.simulation.device import (
+from simulated_board import (
     UNSET,
     BoardCounts,
     Device,
@@ -29,8 +25,13 @@ from fuzzytree.tactile.simulation.device import (
     Wire,
     bauds,
     empty,
+    encoded,
+    in_board_order,
 )
-from fuzzytree.tactile.simulation.encoding import encoded, in_board_order
+
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.tactile.boards import Board, Marker, Port
+from fuzzytree.tactile.sensor import Cells
 
 _NOISE = 16  # the most bytes of noise between two frames
 _CHANCES = ("flip", "lose", "double", "noise", "marker")
@@ -62,7 +63,6 @@ class ConnectionFaults(Faults, frozen=True):
 
     def __post_init__(self) -> None:
         """Refuse probabilities that are out of range."""
-        super().__post_init__()
         total = self.flip + self.lose + self.double
         if not all(0.0 <= getattr(self, name) <= 1.0 for name in _CHANCES):
             raise InvalidModelError([((), "a probability lies in 0 to 1")])

@@ -28,6 +28,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from serial_faults import ConnectionFaults, damaged, noise, with_marker
+from simulated_board import banner, bounds, encoded
 from soak_verdicts import explained
 
 from fuzzytree.tactile.boards import (
@@ -41,8 +42,6 @@ from fuzzytree.tactile.boards import (
 )
 from fuzzytree.tactile.link import Decoder, decoder_of
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulation.device import bounds
-from fuzzytree.tactile.simulation.encoding import banner, encoded
 
 FAULTS = ConnectionFaults(flip=1e-4, lose=5e-5, double=5e-5, noise=0.01, marker=0.1)
 CUT_EVERY = 5000  # frames after which the plug is pulled in the middle of one

@@ -18,12 +18,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from msgspec.structs import replace
 from serial_faults import ConnectionFaults, FaultyDevice
+from simulated_board import BoardCounts, Device, Pause
 from soak import CASES, FAULTS, Pool, frame_key, pool_of
 
 from fuzzytree.tactile.boards import Board, Request
 from fuzzytree.tactile.link import Connection, open_connection
 from fuzzytree.tactile.sensor import Cells, Counters
-from fuzzytree.tactile.simulation.device import BoardCounts, Device, Pause
 
 # The cells of some frames hold the marker anyway.
 LINE_FAULTS = replace(FAULTS, marker=0.0, unplug=Pause(0.2, every=20_000))

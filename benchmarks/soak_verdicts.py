@@ -9,9 +9,10 @@ import re
 from collections.abc import Iterator
 from typing import Literal, assert_never
 
+from simulated_board import checksum
+
 from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
 from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.simulation.encoding import checksum
 
 Verdict = Literal["untold", "late", "unexplained"]
 """As the columns of the table of `soak.py`."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from serial_faults import ConnectionFaults, Receiver, damaged, noise, with_marker
+from simulated_board import encoded
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.tactile.boards import Board, Marker, Port, Protocol, Text
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulation.encoding import encoded
 
 DATA = np.random.default_rng(1).bytes(100_000)
 

@@ -13,13 +13,12 @@ import soak_line
 import soak_verdicts
 from msgspec.structs import replace
 from serial_faults import ConnectionFaults
+from simulated_board import Pause, banner, blob, encoded
 
 from fuzzytree.tactile.board_file import load_board
 from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
 from fuzzytree.tactile.link import decoder_of
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulation.device import Pause, blob
-from fuzzytree.tactile.simulation.encoding import banner, encoded
 
 ROOT = Path(__file__).parents[2]
 BOARDS = sorted((ROOT / "examples" / "tactile" / "boards").glob("*.yaml"))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from simulated_board import banner, encoded
 
 from fuzzytree.tactile.boards import (
     Board,
@@ -19,7 +20,6 @@ from fuzzytree.tactile.boards import (
 )
 from fuzzytree.tactile.link import Decoder
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulation.encoding import banner, encoded
 
 
 def _board(

@@ -1,4 +1,4 @@
-"""`fuzzytree tactile replay`: what is in a recording; its frames, again."""
+"""`fuzzytree tactile replay`: what is in a recording, and its frames in other files."""
 
 from __future__ import annotations
 
@@ -16,20 +16,14 @@ from fuzzytree.cli import (
     answer,
     answer_json,
     argument,
-    flag,
     option,
-    say,
     say_rows,
     takes,
 )
 from fuzzytree.files import check_place, open_atomically, write_atomically
-from fuzzytree.tactile.cli.signals import stop_signal
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.link.recording import RecordingFile, Review
-
-_LOOK_S = 0.1
-_LAST_S = 0.2  # for the reader of a port to take the last bytes
 
 
 class TactileReplayOptions(ResultOptions):
@@ -39,30 +33,14 @@ class TactileReplayOptions(ResultOptions):
     output: str | None = option(
         "-o --output FILE", "File for the frames (.csv, .npz) or for the board (.yaml)."
     )
-    to_port: bool = flag(
-        "--to-port", "Send the frames through a new port, as the board did."
-    )
-    speed: float | None = option(
-        "--speed X",
-        "Speed of --to-port as a multiple of the recorded one; default 1.",
-        type=click.FloatRange(0.0, min_open=True),
-    )
 
 
-@click.command("replay", short_help="Summarise a recording, or play it again.")
+@click.command("replay", short_help="Summarise or convert a recording.")
 @takes(TactileReplayOptions)
 def command(options: TactileReplayOptions) -> None:
-    """Summarise a recording: board, frames, seconds, counters, gaps, damage.
-
-    With --to-port the frames are sent through a new port, whose name is printed, at
-    their recorded times, once a host opens it; Ctrl-C ends.
-    """
+    """Summarise a recording: board, frames, seconds, counters, gaps, damage."""
     from fuzzytree.tactile.link.recording import RecordingFile, review
 
-    if options.speed is not None and not options.to_port:
-        raise click.UsageError("--speed is for --to-port")
-    if options.to_port and (options.output or options.as_json):
-        raise click.UsageError("--to-port plays only; -o and --json are for without it")
     if options.output is not None:
         check_place(options.output)
         if Path(options.output).suffix not in _WRITERS:
@@ -70,9 +48,6 @@ def command(options: TactileReplayOptions) -> None:
                 f"-o writes .csv, .npz or .yaml, not {options.output}"
             )
     with RecordingFile(options.recording) as file:
-        if options.to_port:
-            _play(file, options.speed or 1.0, quiet=options.quiet)
-            return
         found = review(file)
         if options.as_json:
             facts = {"board": file.board, "started": _started(file)}
@@ -168,21 +143,3 @@ def _write_board(output: str, _: str, file: RecordingFile) -> None:
 
 
 _WRITERS = {".csv": _write_table, ".npz": _write_arrays, ".yaml": _write_board}
-
-
-def _play(file: RecordingFile, speed: float, *, quiet: bool) -> None:
-    """Send the frames through a port of our own, each when it came."""
-    from fuzzytree.report import counted
-    from fuzzytree.tactile.recognition.frame_sources import Paced
-    from fuzzytree.tactile.simulation.device import Device
-
-    paced = Paced(file, speed)
-    cells = (frame.cells for frame in paced)
-    device = Device(file.board, cells, rate=max(speed, 1.0))
-    with contextlib.closing(device), contextlib.closing(paced), stop_signal() as stop:
-        answer(device.port)
-        say("the frames begin when it is opened; Ctrl-C ends", quiet=quiet)
-        while not (device.over.wait(_LOOK_S) or stop.is_set()):
-            pass
-        stop.wait(_LAST_S)
-    say_rows(("sent", counted(device.counts.frames, "frame"), ""), quiet=quiet)

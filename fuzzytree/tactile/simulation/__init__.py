@@ -1,1 +1,1 @@
-"""Boards and presses of our own: what a sensor would read, and what a line would do."""
+"""Presses of our own: what a sensor would read when an object lies on it."""

@@ -25,6 +25,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from serial_faults import ConnectionFaults, FaultyDevice
+from simulated_board import Device, Pause
 
 import fuzzytree as ft
 from fuzzytree.cli.program import main
@@ -34,9 +35,9 @@ from fuzzytree.tactile.boards import Board, Marker, Start
 from fuzzytree.tactile.cli.screen import look_of
 from fuzzytree.tactile.link.recording import Recorder, read_recording
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
-from fuzzytree.tactile.simulation.device import Device, Pause
 
 Call = Callable[..., tuple[int, str, str]]
+ROOT = Path(__file__).parents[3]
 
 NOTHING = np.zeros((4, 4), np.int64)
 SMALL = np.eye(4, dtype=np.int64) * 9
@@ -422,7 +423,7 @@ def test_the_commands_of_the_page_do_what_it_says(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    page = Path(__file__).parents[3].joinpath("docs/how-to/live.md").read_text("utf-8")
+    page = (ROOT / "docs/how-to/live.md").read_text("utf-8")
     monkeypatch.chdir(tmp_path)
     (board,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
     Path("mat.yaml").write_text(board, "utf-8")
@@ -430,8 +431,8 @@ def test_the_commands_of_the_page_do_what_it_says(
     assert len(lines) == 6
     with contextlib.ExitStack() as stack:
         for line in lines:
-            words = shlex.split(line)[1:]
-            if "simulate" in words:
+            program, *words = shlex.split(line)
+            if program == "python":
                 stack.enter_context(simulated(*words))
                 continue
             is_live = "live" in words
@@ -441,9 +442,9 @@ def test_the_commands_of_the_page_do_what_it_says(
 
 
 @contextlib.contextmanager
-def simulated(*words: str) -> Iterator[None]:
+def simulated(script: str, *words: str) -> Iterator[None]:
     """Run a board until the end of the block."""
-    command = [sys.executable, "-m", "fuzzytree", *words]
+    command = [sys.executable, str(ROOT / script), *words]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as run:
         assert run.stdout is not None
         assert run.stdout.readline() == b"board\n"

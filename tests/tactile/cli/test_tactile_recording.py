@@ -16,17 +16,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from simulated_board import Device, Faults, Pause, blob, encoded
 
 from fuzzytree.cli.console import say
 from fuzzytree.tactile.board_file import board_text, load_board
 from fuzzytree.tactile.boards import Board, Marker, Start
-from fuzzytree.tactile.link import SerialPort, open_connection, ports
+from fuzzytree.tactile.link import SerialPort, ports
 from fuzzytree.tactile.link import recording as records
 from fuzzytree.tactile.link.recording import Recorder, read_recording
 from fuzzytree.tactile.presses import read_presses
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
-from fuzzytree.tactile.simulation.device import Device, Faults, Pause, blob
-from fuzzytree.tactile.simulation.encoding import encoded
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -308,11 +307,6 @@ def test_the_board_of_a_recording_becomes_its_file(call: Call, place: Path) -> N
     ("words", "message"),
     [
         (("a.ftr", "-o", "a.txt"), "-o writes .csv, .npz or .yaml, not a.txt"),
-        (("a.ftr", "--speed", "2"), "--speed is for --to-port"),
-        (
-            ("a.ftr", "--to-port", "--json"),
-            "--to-port plays only; -o and --json are for without it",
-        ),
         (("mat.yaml",), "mat.yaml: is no recording of a board"),
         (("none",), "none: cannot be read: no such file or directory"),
         (
@@ -329,23 +323,6 @@ def test_what_cannot_be_replayed_is_one_sentence(
 ) -> None:
     code, out, err = call("tactile", "replay", *words)
     assert (code, out, err.splitlines()[0]) == (2, "", message)
-
-
-def test_a_recording_goes_through_a_port_again(place: Path) -> None:
-    words = [sys.executable, "-m", "fuzzytree", "tactile", "replay", "a.ftr"]
-    words += ["--to-port", "--speed", "20"]
-    with subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        port = process.stdout.readline().strip()
-        with open_connection(BOARD, port) as line:
-            found = [line.take(5) for _ in range(6)]
-        out, err = process.communicate(timeout=20)
-    assert (process.returncode, out) == (0, "")
-    cells = [frame.cells.tolist() for frame in found if frame is not None]
-    assert cells == read_recording("a.ftr").frames.tolist()
-    assert err.splitlines()[-1] == "sent     6 frames"
 
 
 def test_bytes_that_contradict_the_board_end_before_anything_is_written(

@@ -16,6 +16,7 @@ import msgspec
 import numpy as np
 import pytest
 from serial_faults import ConnectionFaults, FaultyDevice
+from simulated_board import Device, Faults, Pause, blob, encoded
 
 from fuzzytree.errors import MissingExtraError, PortError
 from fuzzytree.tactile.boards import (
@@ -30,8 +31,6 @@ from fuzzytree.tactile.boards import (
 )
 from fuzzytree.tactile.link import Connection, open_connection, opened, ports, start
 from fuzzytree.tactile.sensor import Cells, Frame, Sensor
-from fuzzytree.tactile.simulation.device import Device, Faults, Pause, blob
-from fuzzytree.tactile.simulation.encoding import encoded
 
 BOARD = Board("mat", Sensor(8, 6), Marker("AA 55", checksum="crc16"))
 

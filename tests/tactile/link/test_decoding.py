@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
+from simulated_board import banner, encoded
 
 from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
 from fuzzytree.tactile.link import decoder_of
 from fuzzytree.tactile.sensor import Cells, Counters, Sensor
-from fuzzytree.tactile.simulation.encoding import banner, encoded
 from tests.tactile.families import FAMILIES, check_account, frames_of_file, stream_of
 
 CUT_HERE = st.lists(st.integers(0, 10_000), max_size=12)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simulated_board import checksum, encoded
 
 from fuzzytree.tactile.boards import Board, Checksum, Marker, Pressure
 from fuzzytree.tactile.link import decoder_of
 from fuzzytree.tactile.link.fixed import are_whole, layout_of
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulation.encoding import checksum, encoded
 
 PLAIN = Board("b", Sensor(1, 4), Marker("AA 55"))
 

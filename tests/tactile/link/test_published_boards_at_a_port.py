@@ -6,10 +6,10 @@ import itertools
 from pathlib import Path
 
 import pytest
+from simulated_board import Device, blob
 
 from fuzzytree.tactile.board_file import load_board
 from fuzzytree.tactile.link import open_connection
-from fuzzytree.tactile.simulation.device import Device, blob
 
 BOARDS = sorted(
     (Path(__file__).parents[3] / "examples" / "tactile" / "boards").glob("*.yaml")

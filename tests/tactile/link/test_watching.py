@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simulated_board import encoded
 
 from fuzzytree.tactile.boards import Board, Marker, Protocol, Request, Sentinel, Text
 from fuzzytree.tactile.link.watching import (
@@ -14,7 +15,6 @@ from fuzzytree.tactile.link.watching import (
     frame_time,
 )
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulation.encoding import encoded
 
 
 def _board(protocol: Protocol, rows: int = 4, columns: int = 6) -> Board:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from simulated_board import Wire, encoded
 
 import fuzzytree as ft
 from fuzzytree.errors import WriteError
@@ -23,8 +24,6 @@ from fuzzytree.tactile.recognition.frame_sources import (
 )
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
-from fuzzytree.tactile.simulation.device import Wire
-from fuzzytree.tactile.simulation.encoding import encoded
 
 BOARD = Board("mat", Sensor(4, 4), Marker("AA 55", checksum="crc16"))
 FRAME = encoded(BOARD, np.arange(16).reshape(4, 4), 0)

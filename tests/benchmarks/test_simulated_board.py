@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import os
 import re
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,9 +16,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import serial
+from msgspec.structs import replace
 from serial_faults import ConnectionFaults, FaultyCounts, FaultyDevice, Receiver
+from simulated_board import (
+    BoardCounts,
+    Device,
+    Faults,
+    Pause,
+    banner,
+    blob,
+    bounds,
+    encoded,
+    main,
+)
 
-from fuzzytree.errors import InvalidModelError, TableError, WriteError
+from fuzzytree.errors import TableError, WriteError
+from fuzzytree.tactile.board_file import board_text
 from fuzzytree.tactile.boards import (
     Board,
     Marker,
@@ -22,20 +39,14 @@ from fuzzytree.tactile.boards import (
     Protocol,
     Request,
     Sentinel,
+    Start,
     Text,
 )
-from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulation.device import (
-    BoardCounts,
-    Device,
-    Faults,
-    Pause,
-    blob,
-    bounds,
-    faults_of,
-)
-from fuzzytree.tactile.simulation.encoding import banner, encoded
+from fuzzytree.tactile.link import open_connection
+from fuzzytree.tactile.link.recording import Recorder
+from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
+ROOT = Path(__file__).parents[2]
 MAT = Board("mat", Sensor(8, 8), Marker("AA 55"), banner=1)
 
 
@@ -59,7 +70,7 @@ def _all(device: Device, host: serial.Serial) -> bytes:
     host.timeout = 0.01
     found, is_over = b"", False
     while not is_over:
-        is_over = device.over.is_set()  # asked first: what follows is all there is
+        is_over = device.over.is_set()  # first: what follows is all there is
         while data := host.read(4096):
             found += data
     return found
@@ -266,42 +277,80 @@ def test_a_blob_holds_only_what_the_board_can_send(
 def test_the_page_names_every_fault_and_its_example_runs(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    page = (Path(__file__).parents[3] / "docs" / "how-to" / "device.md").read_text(
-        "utf-8"
-    )
+    page = (ROOT / "docs" / "how-to" / "device.md").read_text("utf-8")
     for name in Faults.__struct_fields__:
-        assert f"| `{name}=" in page
+        assert f"| `--{name} " in page
     (script,) = re.findall("```python\n(.*?)```", page, re.DOTALL)
     exec(script, {})
     assert capsys.readouterr().out == "200 True\n"
 
 
-def test_faults_are_written_as_names_and_durations() -> None:
-    assert faults_of(["stall=2", "unplug=3s/500"]) == Faults(
-        stall=Pause(2.0), unplug=Pause(3.0, 500)
-    )
-    assert faults_of([]) == Faults()
+BOARD = Board("mat", Sensor(4, 6, full=200), Marker("AA 55"), start=Start(frames=3))
+
+
+@contextlib.contextmanager
+def _running(*words: str | Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Run the command line; give the process and the port that it prints."""
+    command = [sys.executable, ROOT / "benchmarks" / "simulated_board.py", *words]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        yield process, process.stdout.readline().strip()
+
+
+def _taken(board: Board, port: str, count: int) -> list[Cells]:
+    with open_connection(board, port) as line:
+        frames = [line.take(5.0) for _ in range(count)]
+    return [frame.cells for frame in frames if frame is not None]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_objects_are_fitted_to_the_board_until_a_signal(
+    number: int, tmp_path: Path
+) -> None:
+    (tmp_path / "mat.yaml").write_text(board_text(BOARD), "utf-8")
+    words = (tmp_path / "mat.yaml", "--object", "hand-0", "--link", tmp_path / "port")
+    with _running(*words) as (process, port):
+        assert port == str(tmp_path / "port")
+        frames = _taken(BOARD, port, 20)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=20.0)
+    assert [int(cells.max()) for cells in frames[:3]] == [0, 0, 0]
+    assert frames[-1].shape == (4, 6)
+    assert 20 < max(int(cells.max()) for cells in frames) <= 200
+    assert process.returncode == 0
+    assert "opens 1" in err
+    assert not os.path.lexists(port)
+
+
+def test_a_recording_goes_through_a_port_again(tmp_path: Path) -> None:
+    board = replace(BOARD, sensor=replace(BOARD.sensor, baseline=(7,) * 24))
+    with Recorder(tmp_path / "a.ftr", board) as recorder:
+        for number in range(6):
+            cells = np.full((4, 6), 10 * number)
+            recorder.write(Frame(cells, 0.5 * number, number), Counters())
+    begin = time.monotonic()
+    with _running("--recording", tmp_path / "a.ftr", "--speed", "5") as (process, port):
+        frames = _taken(board, port, 3 + 6)
+        _, err = process.communicate(timeout=20.0)
+    assert time.monotonic() - begin >= 2.5 / 5
+    assert [int(cells[0, 0]) for cells in frames] == [7, 7, 7, 0, 10, 20, 30, 40, 50]
+    assert (process.returncode, err.split(",")[0]) == (0, "frames 9")
 
 
 @pytest.mark.parametrize(
-    ("texts", "sentence"),
+    ("words", "sentence"),
     [
-        (["flop=1"], "no fault 'flop'; there is stall, unplug"),
-        (["stall"], "stall: must be seconds, such as 2s or 2s/500"),
-        (["stall=soon"], "stall=soon: must be seconds, such as 2s or 2s/500"),
-        (["stall=1e"], "stall=1e: must be seconds, such as 2s or 2s/500"),
-        (["stall=1", "stall=2"], "the fault 'stall' is stated twice"),
-        (["stall=0s"], "stall takes 0 to 86400 seconds, not 0.0"),
-        (["unplug=1s/0"], "unplug comes every 1 or more frames, not 0"),
+        ([], "expected either BOARD.yaml or --recording FILE"),
+        (["a.yaml", "--recording", "a.ftr"], "expected either BOARD.yaml or "),
+        (["a.yaml", "--object", "foot"], "invalid choice: 'foot' (choose from "),
+        (["none.yaml"], "none.yaml: cannot be read: no such file or directory"),
     ],
 )
-def test_a_wrong_fault_is_refused(texts: list[str], sentence: str) -> None:
-    with pytest.raises(ValueError, match=re.escape(sentence)) as caught:
-        faults_of(texts)
-    assert str(caught.value) == sentence
-
-
-def test_all_mistakes_of_faults_are_listed() -> None:
-    with pytest.raises(InvalidModelError) as caught:
-        Faults(stall=Pause(-1.0), unplug=Pause(1.0, 0))
-    assert len(caught.value.mistakes) == 2
+def test_what_cannot_be_simulated_is_one_sentence(
+    words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert sentence in capsys.readouterr().err + str(caught.value)

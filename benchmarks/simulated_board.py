@@ -1,11 +1,18 @@
 """A simulated board behind a pseudo-terminal, for trying hosts without hardware.
 
-The port takes the time of a serial connection. On request the board pauses (`stall`) or
-goes away and comes back (`unplug`).
+    python benchmarks/simulated_board.py mat.yaml --object all --link ./board
+    python benchmarks/simulated_board.py --recording a.ftr
+
+It prints its port and goes on until Ctrl-C, or until the recording ends. The port takes
+the time of a serial connection. On request the board pauses (`stall`) or goes away and
+comes back (`unplug`). What proves a frame (checksums, runs of zeros, lines) is written
+from the description in `fuzzytree/tactile/boards.py` alone, so that a frame that goes
+out here and comes in there is a test of both.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import os
 import re
@@ -17,19 +24,38 @@ import threading
 import time
 from collections import deque
 from collections.abc import Generator, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
+from itertools import islice
 from pathlib import Path
+from typing import assert_never
 
 import numpy as np
-from msgspec.structs import replace
+import numpy.typing as npt
 
-from fuzzytree.errors import InvalidModelError, WriteError
+from fuzzytree.errors import FuzzyTreeError, TableError, WriteError
 from fuzzytree.files import reason
-from fuzzytree.model import Mistake, Value
-from fuzzytree.tactile.boards import Board, Port, Request, Sentinel
-from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.simulation.encoding import banner, encoded
+from fuzzytree.model import Value
+from fuzzytree.tactile.board_file import load_board
+from fuzzytree.tactile.boards import (
+    Board,
+    Checksum,
+    Marker,
+    Port,
+    Request,
+    Sentinel,
+    Text,
+)
+from fuzzytree.tactile.cli.signals import stop_signal
+from fuzzytree.tactile.link.fixed import layout_of
+from fuzzytree.tactile.recognition.frame_sources import (
+    FRAMES_A_SECOND,
+    Replayed,
+    simulated,
+)
+from fuzzytree.tactile.sensor import Cells, check_frames
+from fuzzytree.tactile.simulation.objects import OBJECTS
+from fuzzytree.tactile.simulation.physics import FULL
 
 if sys.platform != "win32":
     import termios
@@ -38,21 +64,18 @@ if sys.platform != "win32":
 BOOT_S = 0.05
 """Pause after a host has opened the port, as of boards that reset then."""
 
-EVERY = 100
-"""Frames between two pauses, unless stated."""
-
 UNSET = 50
 """Speed of a terminal whose own baud rate has no name."""
 
+_SEPARATORS = {"space": " ", "comma": ",", "semicolon": ";"}
+_NEWLINE = "\r\n"  # what println of an Arduino ends a line with
 _POLL_S = 0.01
 _WIRE_POLL_S = 0.02
 _PIECE_S = 0.002  # duration of the bytes that are written at once
 _SLACK_S = 0.02  # by how much a late piece may hurry the next ones
 _INPUT_BYTES = 64  # size of the input buffer, as on an Arduino
-_PAUSE = re.compile(
-    r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)s?(?:/([0-9]{1,9}))?",
-    re.ASCII,
-)
+_LOOK_S = 0.05
+_LAST_S = 0.2  # for the host to take the last bytes
 
 
 class Pause(Value, frozen=True):
@@ -64,7 +87,7 @@ class Pause(Value, frozen=True):
     """
 
     seconds: float
-    every: int = EVERY
+    every: int = 100
 
 
 class Faults(Value, frozen=True):
@@ -73,55 +96,10 @@ class Faults(Value, frozen=True):
     Attributes:
         stall: The board is silent for a while.
         unplug: The port goes away, and comes back.
-
-    Raises:
-        InvalidModelError: If a duration or count is out of range; it lists all.
     """
 
     stall: Pause | None = None
     unplug: Pause | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse durations and counts out of range."""
-        mistakes: list[Mistake] = []
-        for name, pause in (("stall", self.stall), ("unplug", self.unplug)):
-            if pause and not 0.0 < pause.seconds <= 86400.0:
-                text = f"{name} takes 0 to 86400 seconds, not {pause.seconds!r}"
-                mistakes.append(((name,), text))
-            if pause and pause.every < 1:
-                text = f"{name} comes every 1 or more frames, not {pause.every}"
-                mistakes.append(((name,), text))
-        if mistakes:
-            raise InvalidModelError(mistakes)
-
-
-def faults_of(texts: Sequence[str]) -> Faults:
-    """Return the faults that are written as `NAME=SECONDS` or `NAME=SECONDS/FRAMES`.
-
-    Args:
-        texts: Such as `stall=2s` (every 100 frames) or `unplug=3s/500`.
-
-    Raises:
-        ValueError: If one is not of this form, or stated twice.
-        InvalidModelError: If a number is out of range.
-
-    Example:
-        >>> faults_of(["unplug=3s/500"]).unplug
-        Pause(seconds=3.0, every=500)
-    """
-    known: dict[str, Pause] = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        if name not in Faults.__struct_fields__:
-            names = ", ".join(Faults.__struct_fields__)
-            raise ValueError(f"no fault {name!r}; there is {names}")
-        if name in known:
-            raise ValueError(f"the fault {name!r} is stated twice")
-        parts = _PAUSE.fullmatch(value)
-        if parts is None:
-            raise ValueError(f"{text}: must be seconds, such as 2s or 2s/500")
-        known[name] = Pause(float(parts[1]), int(parts[2] or EVERY))
-    return replace(Faults(), **known)
 
 
 @dataclass(slots=True)
@@ -184,8 +162,6 @@ class Wire:
         Raises:
             WriteError: If it cannot be made.
         """
-        if not hasattr(os, "openpty"):
-            raise WriteError("this system has no pseudo-terminals")
         if self._link.exists():
             what = f"it leads to {self._link.resolve()}, which is there"
             if not self._link.is_symlink():
@@ -319,8 +295,7 @@ class Device(contextlib.AbstractContextManager["Device"]):
         """
         self._board, self._frames = board, iter(frames)
         self._faults = faults or Faults()
-        self._first, self._coming = first, deque(first)
-        self._ahead: Cells | None = None  # the next frame, so that the last is known
+        self._first, self._coming = first, deque[Cells]()
         self._frame_s = 1.0 / frames_a_second if frames_a_second else 0.0
         self._due = 0.0
         self._stop = threading.Event()
@@ -368,7 +343,6 @@ class Device(contextlib.AbstractContextManager["Device"]):
 
     def _run(self) -> None:
         try:
-            self._ahead = next(self._frames, None)
             while not self._stop.is_set():
                 gone_s = self._served()
                 self._wire.plug_out()
@@ -381,30 +355,30 @@ class Device(contextlib.AbstractContextManager["Device"]):
     def _served(self) -> float:
         """Serve every host until an `unplug`; return its duration in seconds."""
         while not self._stop.wait(_POLL_S):
+            self._look_ahead()
             if not self._wire.is_open:
                 continue
             self._stop.wait(BOOT_S)
             self._counts.opens += 1
-            self._input, self._coming = b"", deque(self._first)
+            self._input = b""
+            self._coming.extendleft(reversed(self._first))
             self._wire.rest()
             self._wire.send(banner(self._board))
             while self._wire.is_open and not self._stop.is_set():
-                if not self._is_due():
-                    continue
-                if not self._coming and self._ahead is None:
-                    self.over.set()
+                if not self._look_ahead():
                     self._stop.wait(_POLL_S)
-                    continue
-                if self._coming or self._ahead is None:
-                    cells = self._coming.popleft()
-                else:
-                    cells, self._ahead = self._ahead, next(self._frames, None)
-                if gone_s := self._sent(cells):
+                elif self._is_due() and (gone_s := self._sent(self._coming.popleft())):
                     return gone_s
-                if not self._coming and self._ahead is None:
-                    self.over.set()
             self._counts.closes += not self._wire.is_open
         return 0.0
+
+    def _look_ahead(self) -> bool:
+        """Take the next frame, and return whether there is one."""
+        if not self._coming:
+            self._coming.extend(islice(self._frames, 1))
+        if not self._coming:
+            self.over.set()
+        return bool(self._coming)
 
     def _is_due(self) -> bool:
         """Return whether to send a frame now; without requests always True."""
@@ -524,3 +498,229 @@ def fitted(board: Board, cells: Cells, full: int) -> Cells:
     )
     taken = cells[np.ix_(rows, columns)].astype(np.int64)
     return low + np.clip(taken, 0, full) * (high - low) // full
+
+
+def encoded(board: Board, cells: Cells, number: int = 0) -> bytes:
+    """Return the bytes of one frame, from the first to the last.
+
+    The number of the frame, from 0, stands where boards put a time stamp.
+
+    Raises:
+        TableError: If the cells are of another size, or hold what this board cannot
+            send.
+
+    Example:
+        >>> from fuzzytree.tactile.sensor import Sensor
+        >>> protocol = Marker("AA 55", checksum="sum8")
+        >>> board = Board("tiny", Sensor(1, 3), protocol)
+        >>> encoded(board, np.array([[1, 0, 2]])).hex(" ")
+        'aa 55 01 00 02 03'
+    """
+    values = in_board_order(board, cells)
+    protocol = board.protocol
+    match protocol:
+        case Marker() | Request():
+            layout = layout_of(board, protocol)
+            stamp = _stamp(number, protocol.skip)
+            front = layout.head + stamp + values.astype(layout.dtype).tobytes()
+            check = checksum(protocol.checksum, front[layout.checked_from :])
+            return front + check + layout.tail
+        case Sentinel():
+            return _with_runs(protocol, values)
+        case Text():
+            return _lines(board, protocol, values, number)
+        case _:
+            assert_never(protocol)
+
+
+def banner(board: Board) -> bytes:
+    r"""Return the lines that the board sends when it starts.
+
+    Example:
+        >>> from fuzzytree.tactile.sensor import Sensor
+        >>> banner(Board("mat", Sensor(2, 2), Text(), banner=1))
+        b'mat: ready\r\n'
+    """
+    name = "".join(sign for sign in board.name if " " <= sign <= "~") or "board"
+    return f"{name}: ready{_NEWLINE}".encode() * board.banner
+
+
+def in_board_order(board: Board, cells: Cells) -> npt.NDArray[np.int64]:
+    """Return a frame's cells in the order in which the board sends them, checked.
+
+    Raises:
+        TableError: If there is not one frame, or a cell holds what cannot be sent.
+    """
+    frames = check_frames(board.sensor, cells)
+    if len(frames) != 1:
+        raise TableError(f"one frame is sent at a time, not {len(frames)}")
+    frame = frames[0].T if board.order == "columns" else frames[0]
+    values: npt.NDArray[np.int64] = frame.astype(np.int64).ravel()
+    low, high = int(values.min()), int(values.max())
+    if low < 0 or high > board.sensor.full:
+        wrong = low if low < 0 else high
+        raise TableError(f"a cell lies in 0 to {board.sensor.full}, not {wrong}")
+    if board.pressure == "falls":
+        values = board.sensor.full - values
+        high = int(values.max())
+    protocol = board.protocol
+    if isinstance(protocol, Sentinel):
+        for value in {protocol.end, protocol.zero} - {0}:
+            if value in values:
+                raise TableError(f"the board {board.name!r} has no cells of {value}")
+    if not isinstance(protocol, Text):
+        bits = 8 if isinstance(protocol, Sentinel) else protocol.bits
+        if high >> bits:
+            raise TableError(f"a cell of {high} does not fit into {bits} bits")
+    return values
+
+
+def checksum(kind: Checksum, body: bytes) -> bytes:
+    """Return the checksum of some bytes: none, one or two bytes.
+
+    `crc16` is that of Modbus (polynomial 0x8005 reflected, start 0xFFFF), low byte
+    first.
+
+    Example:
+        >>> [checksum(k, b"123456789").hex() for k in ("sum8", "xor8", "crc16")]
+        ['dd', '31', '374b']
+    """
+    match kind:
+        case "none":
+            return b""
+        case "sum8":
+            return bytes([sum(body) & 0xFF])
+        case "xor8":
+            return bytes([int(np.bitwise_xor.reduce(np.frombuffer(body, np.uint8)))])
+        case "crc16":
+            return _crc16(body).to_bytes(2, "little")
+        case _:
+            assert_never(kind)
+
+
+def _crc16(body: bytes) -> int:
+    crc = 0xFFFF
+    for byte in body:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
+    return crc
+
+
+def _stamp(number: int, size: int) -> bytes:
+    return (number % (1 << 8 * size)).to_bytes(size, "little")
+
+
+def _with_runs(protocol: Sentinel, values: npt.NDArray[np.int64]) -> bytes:
+    """Return the cells with runs of zeros packed, and the byte that ends them."""
+    sent = bytearray()
+    run = 0
+    for value in [*values.tolist(), None]:
+        if value == 0:
+            run += 1
+            continue
+        while run:
+            length = min(run, 255)
+            if length == protocol.end:  # would end the frame: two shorter runs
+                length -= 1
+            if length == 0:
+                raise TableError(f"a run of {run} zeros would end the frame")
+            sent += bytes((protocol.zero, length))
+            run -= length
+        if value is not None:
+            sent.append(value)
+    sent.append(protocol.end)
+    return bytes(sent)
+
+
+def _lines(
+    board: Board, protocol: Text, values: npt.NDArray[np.int64], number: int
+) -> bytes:
+    separator = _SEPARATORS[protocol.separator]
+    is_block = protocol.frame == "block"
+    by_row = board.order == "rows"
+    width = board.sensor.columns if by_row else board.sensor.rows
+    stamps = [number] * protocol.skip
+    first = [protocol.prefix] if protocol.prefix else []
+    lines = [
+        separator.join(map(str, [*first, *stamps, *line]))
+        for line in values.reshape(-1, width if is_block else len(values)).tolist()
+    ]
+    text = "".join(f"{line}{_NEWLINE}" for line in lines)
+    return f"{text}{_NEWLINE if is_block else ''}".encode()
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Simulate a board until Ctrl-C, or play a recording until it ends."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
+    add = parser.add_argument
+    add("board", metavar="BOARD.yaml", nargs="?", help="the board that is simulated")
+    add("--object", choices=[*OBJECTS, "all"], help="what lies there; a disc if none")
+    add("--recording", metavar="FILE", help="play its frames, as its board sent them")
+    add("--speed", type=float, default=1.0, help="of a recording; default 1")
+    add("--link", metavar="PATH", help="the port; in a folder of its own if none")
+    for name in Faults.__struct_fields__:
+        add(f"--{name}", type=float, metavar="SECONDS", help="after every 100 frames")
+    options = parser.parse_args(words)
+    if (options.board is None) == (options.recording is None):
+        parser.error("expected either BOARD.yaml or --recording FILE")
+    pauses = (options.stall, options.unplug)
+    faults = Faults(*(Pause(seconds) if seconds else None for seconds in pauses))
+    try:
+        if options.recording:
+            _play(options.recording, options.speed, faults, options.link)
+        else:
+            _simulate(load_board(options.board), options.object, faults, options.link)
+    except (FuzzyTreeError, ValueError) as error:
+        sys.exit(str(error))
+
+
+def _simulate(board: Board, name: str | None, faults: Faults, link: str | None) -> None:
+    """Show an object, all in turn, or a disc, until Ctrl-C."""
+    names = tuple(OBJECTS) if name == "all" else (name or "",)
+    pressed = (fitted(board, one.frame.cells, FULL) for one in simulated(names=names))
+    device = Device(
+        board,
+        pressed if name else blob(board),
+        faults,
+        link=link,
+        first=[empty(board)] * board.start.frames,
+        frames_a_second=FRAMES_A_SECOND,
+    )
+    with device, stop_signal() as stop:
+        print(device.port, flush=True)
+        stop.wait()
+    _report(device)
+
+
+def _play(path: str, speed: float, faults: Faults, link: str | None) -> None:
+    """Send the frames of a recording at their times, after some of its baseline."""
+    source = Replayed(path, speed)
+    board, sensor = source.board, source.board.sensor
+    rest = empty(board)
+    if sensor.baseline:
+        rest = np.array(sensor.baseline).reshape(rest.shape)
+    device = Device(
+        board,
+        (frame.cells for frame in source),
+        faults,
+        max(speed, 1.0) if speed else None,
+        link=link,
+        first=[rest] * board.start.frames,
+    )
+    # The source first: it ends the wait for the next frame.
+    with device, contextlib.closing(source), stop_signal() as stop:
+        print(device.port, flush=True)
+        while not (device.over.wait(_LOOK_S) or stop.is_set()):
+            pass
+        stop.wait(_LAST_S)
+    _report(device)
+
+
+def _report(device: Device) -> None:
+    counts = asdict(device.counts).items()
+    print(", ".join(f"{name} {count}" for name, count in counts), file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import doctest
+
 import numpy as np
 import pytest
+import simulated_board
+from simulated_board import banner, checksum, encoded
 
 from fuzzytree.errors import TableError
 from fuzzytree.tactile.boards import (
@@ -16,7 +20,6 @@ from fuzzytree.tactile.boards import (
     Text,
 )
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulation.encoding import banner, checksum, encoded
 
 CELLS = np.array([[1, 0, 258], [0, 0, 16]])
 
@@ -124,3 +127,7 @@ def test_a_banner_has_its_lines_and_no_byte_that_is_no_letter() -> None:
     sensor = Sensor(2, 2)
     assert banner(Board("täst\n", sensor, Text(), banner=2)) == b"tst: ready\r\n" * 2
     assert banner(Board("mat", sensor, Text())) == b""
+
+
+def test_the_examples_of_the_board_give_what_they_show() -> None:
+    assert doctest.testmod(simulated_board).failed == 0
