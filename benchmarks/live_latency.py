@@ -30,11 +30,12 @@ from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tactile.boards import Board, Marker, Port
-from fuzzytree.tactile.cli.live import MOST_WAITING, SWITCH_S
+from fuzzytree.tactile.cli.live import SWITCH_S
 from fuzzytree.tactile.cli.screen import Screen
 from fuzzytree.tactile.link import open_connection
 from fuzzytree.tactile.recognition.frame_sources import PAPER_BOARD, simulated
 from fuzzytree.tactile.recognition.live import Live
+from fuzzytree.tactile.recognition.sensing import MOST_WAITING
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import press
