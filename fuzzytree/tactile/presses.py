@@ -2,38 +2,59 @@
 
 The arrays: `frames`, whole numbers of shape (frames, rows, columns); `full`, the
 reading of a saturated cell; `threshold`, above which a cell is pressed, default 0; and,
-where known, `label`, the index of each frame's class in `label_names`, and `subject`,
-a number for each person or object that pressed.
+where known, `label`, the index of each frame's class in `label_names`, `subject`,
+a number for each person or object that pressed, and `times`, in seconds, and `numbers`
+of frames that follow each other.
+
+A table (`.csv`) has a line for each frame, with the columns `time`, `number`, `r0c0`,
+`r0c1` and so on; the first two may be missing.
 """
 
 from __future__ import annotations
 
+import codecs
 import io
+import itertools
 import lzma
 import math
 import os
+import re
 import struct
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.errors import InvalidModelError, ReadError
-from fuzzytree.files import PathLike, read_bounded, reason
-from fuzzytree.tactile.link.recording import MAGIC, read_recording
-from fuzzytree.tactile.sensor import LARGEST_SIDE, Cells, Sensor
+from fuzzytree.csv_rows import BLOCK, CsvRows, blocks
+from fuzzytree.errors import InvalidModelError, ReadError, TableError
+from fuzzytree.files import PathLike, check_stream, read_bounded, reason
+from fuzzytree.tactile.boards import Board, Marker
+from fuzzytree.tactile.link.recording import (
+    MAGIC,
+    FrameFile,
+    Recording,
+    RecordingFile,
+    read_recording,
+)
+from fuzzytree.tactile.sensor import (
+    FRAMES_A_SECOND,
+    LARGEST_SIDE,
+    Cells,
+    Counters,
+    Sensor,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
 
 LIMIT = 2**30
-"""The most bytes of an archive, packed or not."""
+"""The most bytes of an archive, packed or not, or of a table."""
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the first that a zip file can hold
 _MOST_MEMBERS = 64
@@ -46,7 +67,18 @@ _BROKEN_HEADER = (
     *(ValueError, KeyError, TypeError, SyntaxError, tokenize.TokenError),
     *(MemoryError, RecursionError),
 )
-_USED = ("frames", "full", "threshold", "label", "label_names", "subject")
+_USED = (
+    *("frames", "full", "threshold", "label", "label_names", "subject"),
+    *("times", "numbers"),
+)
+_TABLE = ".csv"
+_CELL = re.compile("r(0|[1-9][0-9]{0,2})c(0|[1-9][0-9]{0,2})")
+_MOST = {"time": 2**33, "number": 2**53 - 1}
+"""Seconds that fit a recording's nanoseconds, and whole numbers that a float keeps."""
+
+
+def _no_times() -> npt.NDArray[np.float64]:
+    return np.zeros(0, np.float64)
 
 
 def _unknown() -> npt.NDArray[np.int64]:
@@ -65,6 +97,8 @@ class Presses:
         label_names: The names of the classes.
         subject: Shape (frames,): who was pressing; empty if it is not known.
         is_stream: Whether the frames follow each other, as in a recording.
+        times: Shape (frames,): in seconds; empty if they are not known.
+        numbers: Shape (frames,): of each frame; empty if they are not known.
     """
 
     frames: Cells
@@ -73,6 +107,8 @@ class Presses:
     label_names: tuple[str, ...] = ()
     subject: npt.NDArray[np.int64] = field(default_factory=_unknown)
     is_stream: bool = False
+    times: npt.NDArray[np.float64] = field(default_factory=_no_times)
+    numbers: npt.NDArray[np.int64] = field(default_factory=_unknown)
 
     def placements(self, is_pressed: npt.NDArray[np.bool_]) -> dict[str, int]:
         """Return how often something was put down, for each class that is known.
@@ -135,11 +171,7 @@ def read_presses(path: PathLike, *, label: str = "label") -> Presses:
         )
     if not len(frames):
         raise ReadError(f"{name}: holds no frame")
-    if not all(1 <= side <= LARGEST_SIDE for side in frames.shape[1:]):
-        raise ReadError(
-            f"{name}: a frame has 1 to {LARGEST_SIDE} rows and columns, "
-            f"not {frames.shape[1]} x {frames.shape[2]}"
-        )
+    _check_sides(frames.shape[1:], name)
     names = _texts(arrays.get(f"{label}_names"), name, f"{label}_names")
     labels = _codes(arrays.get(label), len(frames), name, label)
     if len(labels) and not (labels.min() >= 0 and labels.max() < len(names)):
@@ -148,11 +180,29 @@ def read_presses(path: PathLike, *, label: str = "label") -> Presses:
             f"{len(names) - 1}, not {labels.min()} to {labels.max()}"
         )
     subject = _codes(arrays.get("subject"), len(frames), name, "subject")
-    usual = 255 if frames.dtype.itemsize == 1 else 65535
+    numbers = _codes(arrays.get("numbers"), len(frames), name, "numbers")
+    if (numbers < 0).any():
+        raise ReadError(f"{name}: 'numbers' must be 0 or more, not {numbers.min()}")
+    times = _times(arrays.get("times"), len(frames), name)
+    usual = _usual_full(frames)
     full = _number(arrays.get("full"), usual, 1, 65535, f"{name}: 'full'")
     least = _number(arrays.get("threshold"), 0, 0, full - 1, f"{name}: 'threshold'")
     rows, columns = frames.shape[1:]
-    return Presses(frames, Sensor(rows, columns, full, least), labels, names, subject)
+    sensor = Sensor(rows, columns, full, least)
+    is_stream = len(times) > 0
+    return Presses(frames, sensor, labels, names, subject, is_stream, times, numbers)
+
+
+def _usual_full(frames: Cells) -> int:
+    return 255 if frames.dtype.itemsize == 1 else 65535
+
+
+def _check_sides(sides: Sequence[int], name: str) -> None:
+    if not all(1 <= side <= LARGEST_SIDE for side in sides):
+        raise ReadError(
+            f"{name}: a frame has 1 to {LARGEST_SIDE} rows and columns, "
+            f"not {sides[0]} x {sides[1]}"
+        )
 
 
 def presses_content(presses: Presses) -> bytes:
@@ -220,7 +270,7 @@ def _array(content: bytes, name: str, title: str) -> npt.NDArray[Any]:
         shape, is_turned, dtype = read(file, max_header_size=_LONGEST_HEADER)
     except _BROKEN_HEADER as error:
         raise ReadError(f"{name}: {title!r} is no numpy array: {error}") from error
-    if dtype.kind not in "iuU" or not dtype.itemsize:
+    if dtype.kind not in ("iuf" if title == "times" else "iuU") or not dtype.itemsize:
         raise ReadError(f"{name}: {title!r} holds {dtype}, not whole numbers or text")
     rest = len(content) - file.tell()
     if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != rest:
@@ -260,6 +310,21 @@ def _codes(
     return found.astype(np.int64)
 
 
+def _times(
+    found: npt.NDArray[Any] | None, count: int, name: str
+) -> npt.NDArray[np.float64]:
+    if found is None:
+        return _no_times()
+    times = found.astype(np.float64)
+    most = _MOST["time"]
+    if times.shape != (count,) or not ((times >= 0.0) & (times <= most)).all():
+        raise ReadError(
+            f"{name}: 'times' must hold a number of seconds from 0 to {most} for each "
+            f"of {count} frames"
+        )
+    return times
+
+
 def _number(
     found: npt.NDArray[Any] | None, usual: int, low: int, high: int, where: str
 ) -> int:
@@ -282,13 +347,14 @@ def read_frames(
     """Return the frames of a file.
 
     Args:
-        path: A numpy archive (see `fuzzytree.tactile.presses`) or a recording.
-        full: What a cell takes, instead of what the file says; for archives.
+        path: A recording, a table whose name ends in .csv, or a numpy archive (see
+            `fuzzytree.tactile.presses`).
+        full: What a cell takes, instead of what the file says; not for recordings.
         threshold: Above it a cell is pressed, the same way.
         label: The array of the classes in an archive.
 
     Raises:
-        ReadError: If the file is neither.
+        ReadError: If the file is none of them.
     """
     name = os.fspath(path)
     if Path(path).is_fifo():  # it is read twice, and can keep us waiting
@@ -301,7 +367,10 @@ def read_frames(
     if is_recording:
         recording = read_recording(path)
         return Presses(recording.frames, recording.board.sensor, is_stream=True)
-    presses = read_presses(path, label=label)
+    if Path(path).suffix.lower() == _TABLE:
+        presses = _read_table(path, 255 if full and full <= 255 else 65535)
+    else:
+        presses = read_presses(path, label=label)
     own = presses.sensor
     try:
         limit = own.full if full is None else full
@@ -309,3 +378,163 @@ def read_frames(
         return replace(presses, sensor=Sensor(own.rows, own.columns, limit, least))
     except InvalidModelError as error:
         raise ReadError(f"{name}: {error}") from error
+
+
+def open_frames(path: PathLike, board: Board | None = None) -> FrameFile:
+    """Return the frames of a file, one by one, and what sent them.
+
+    Where an archive or a table has no times there are 44 frames a second, and where it
+    has no numbers they are 0, 1, ...
+
+    Args:
+        path: A recording, an archive (.npz) or a table (.csv).
+        board: What sent the frames of an archive or table; a plain one if None.
+
+    Raises:
+        ReadError: If the file is none of them, does not fit the board, or is a
+            recording, which has its own.
+    """
+    name = os.fspath(path)
+    if Path(path).suffix.lower() not in (_TABLE, ".npz"):
+        if board is not None:
+            raise ReadError(f"{name}: a recording has its own board; name no other one")
+        return RecordingFile(path)
+    if board is None:
+        found = read_frames(path)
+        sensor = found.sensor
+        board = Board("frames", sensor, Marker("AA 55", bits=sensor.bits))
+    else:
+        sensor = board.sensor
+        found = read_frames(path, full=sensor.full, threshold=sensor.threshold)
+        found = found.on(sensor, name)
+    frames, count, most = found.frames, len(found.frames), sensor.largest
+    if frames.min() < 0 or frames.max() > most:
+        place, row, column = np.argwhere((frames < 0) | (frames > most))[0].tolist()
+        wrong = frames[place, row, column]
+        raise ReadError(
+            f"{name}: r{row}c{column} of frame {place} is {wrong}, and no whole number "
+            f"from 0 to {most}"
+        )
+    return Recording(
+        board,
+        frames.astype(sensor.dtype, copy=False),
+        found.times if len(found.times) else np.arange(count) / FRAMES_A_SECOND,
+        found.numbers if len(found.numbers) else np.arange(count),
+        Counters(frames=count),
+        damaged=0,
+        cut_bytes=0,
+        started_ns=0,
+    )
+
+
+def _read_table(path: PathLike, most: int) -> Presses:
+    """Return the frames of a table, whose cells are at most so much."""
+    name = os.fspath(path)
+    titles: list[str] = []
+    places: list[int] = []
+    sides = (0, 0)
+    cells: list[npt.NDArray[np.uint16]] = []
+    others: dict[str, list[npt.NDArray[np.float64]]] = {title: [] for title in _MOST}
+    try:
+        check_stream(path)
+        if Path(path).stat().st_size > LIMIT:
+            raise ReadError(f"{name}: is larger than {LIMIT} bytes, too large to read")
+        with Path(path).open("rb") as file:
+            head = file.read(BLOCK).removeprefix(codecs.BOM_UTF8)
+            for rows in blocks(head, file.read, b",", name):
+                skipped = 0 if titles else 1
+                if skipped:
+                    titles = [title.strip() for title in rows.header()]
+                    places, sides = _cell_places(titles, f"{name}:{rows.line}")
+                values = _values(rows, titles, most, skipped)
+                cells.append(values[places].T.astype(np.uint16).reshape(-1, *sides))
+                for title in others:
+                    if title in titles:
+                        others[title].append(values[titles.index(title)])
+    except UnicodeDecodeError as error:
+        raise ReadError(f"{name}: is no UTF-8 text; save it as UTF-8") from error
+    except TableError as error:
+        raise ReadError(str(error)) from error
+    except OSError as error:
+        raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
+    if not sum(map(len, cells)):
+        raise ReadError(f"{name}: holds no frame")
+    frames: Cells = np.concatenate(cells)
+    if frames.max() <= 255:
+        frames = frames.astype(np.uint8)
+    times, numbers = (np.concatenate(part or [_no_times()]) for part in others.values())
+    return Presses(
+        frames,
+        Sensor(*sides, _usual_full(frames)),
+        is_stream=True,
+        times=times,
+        numbers=numbers.astype(np.int64),
+    )
+
+
+def _cell_places(
+    titles: Sequence[str], where: str
+) -> tuple[list[int], tuple[int, int]]:
+    """Return which columns hold the cells, row by row, and the sides of a frame."""
+    found = {title: place for place, title in enumerate(titles)}
+    if len(found) < len(titles):
+        twice = next(one for place, one in enumerate(titles) if found[one] != place)
+        raise ReadError(f"{where}: names the column {twice[:40]!r} twice")
+    rows = columns = 0
+    for title in titles:
+        cell = _CELL.fullmatch(title)
+        if cell:
+            rows, columns = max(rows, int(cell[1]) + 1), max(columns, int(cell[2]) + 1)
+        elif title not in _MOST:
+            raise ReadError(
+                f"{where}: the column {title[:40]!r} is neither time, number nor a "
+                f"cell such as r0c0"
+            )
+    if not rows:
+        raise ReadError(f"{where}: has no column of a cell such as r0c0")
+    _check_sides((rows, columns), where)
+    cells = [f"r{row}c{column}" for row in range(rows) for column in range(columns)]
+    for title in cells:
+        if title not in found:
+            raise ReadError(
+                f"{where}: has no column {title!r}, and frames of {rows} x {columns} "
+                f"cells"
+            )
+    return [found[title] for title in cells], (rows, columns)
+
+
+def _values(
+    rows: CsvRows, titles: Sequence[str], most: int, skipped: int
+) -> npt.NDArray[np.float64]:
+    """Return the numbers of some rows, column by column."""
+    found = rows.numbers(len(titles), range(len(titles)), skipped, ())
+    if found is not None:
+        values = np.array(found, np.float64)
+        limits = np.array([[_MOST.get(title, most)] for title in titles])
+        is_time = np.array([[title == "time"] for title in titles])
+        is_fit = (values == np.floor(values)) | is_time
+        if (is_fit & (values >= 0.0) & (values <= limits)).all():
+            return values
+    table = rows.table(len(titles), range(len(titles)))
+    if table.num_rows <= skipped:
+        return np.empty((len(titles), 0))
+    lines = zip(*(column.to_pylist() for column in table.columns), strict=True)
+    for row, texts in itertools.islice(enumerate(lines), skipped, None):
+        for title, text in zip(titles, texts, strict=True):
+            limit, is_whole = _MOST.get(title, most), title != "time"
+            if not _fits(text, limit, is_whole=is_whole):
+                kind = "whole number" if is_whole else "number"
+                raise ReadError(
+                    f"{rows.name}:{rows.line_of(row)}: {title}: {text[:40]!r} is no "
+                    f"{kind} from 0 to {limit}"
+                )
+    raise ReadError(f"{rows.name}:{rows.line}: a cell from here on is no number")
+
+
+def _fits(text: str, most: int, *, is_whole: bool) -> bool:
+    try:
+        value = float(text)
+    except ValueError:
+        return False
+    is_plain = text.isascii() and "_" not in text
+    return is_plain and 0.0 <= value <= most and not (is_whole and value % 1)

@@ -26,6 +26,9 @@ Cells = npt.NDArray[np.integer]
 LARGEST_SIDE = 256
 """The most rows or columns that a sensor may have."""
 
+FRAMES_A_SECOND = 44
+"""What a board of 16 x 16 cells sends at 115200 baud."""
+
 Side = Annotated[int, Meta(ge=1, le=LARGEST_SIDE)]
 Full = Annotated[int, Meta(ge=1, le=65535)]
 

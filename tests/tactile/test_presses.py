@@ -10,9 +10,13 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import ReadError
+from fuzzytree.tactile.boards import Board, Marker
+from fuzzytree.tactile.link.recording import Recording
 from fuzzytree.tactile.presses import (
     Presses,
+    open_frames,
     presses_content,
+    read_frames,
     read_presses,
 )
 from fuzzytree.tactile.sensor import Sensor
@@ -97,6 +101,15 @@ def test_classes_may_stand_under_another_name(tmp_path: Path) -> None:
             "'threshold' must be a whole number from 0 to 8",
         ),
         (
+            {"frames": FRAMES, "times": [0.0, -1.0]},
+            "'times' must hold a number of seconds from 0 to 8589934592 for each of 2 "
+            "frames",
+        ),
+        (
+            {"frames": FRAMES, "numbers": [0, -1]},
+            "'numbers' must be 0 or more, not -1",
+        ),
+        (
             {"frames": FRAMES, "subject": np.array([{}, {}])},
             "'subject' holds object, not whole numbers or text",
         ),
@@ -179,3 +192,125 @@ def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
         with pytest.raises(ReadError) as caught:
             read_presses(path)
         assert str(caught.value) == f"{path}: 'label_names' holds signs that are none"
+
+
+def table(path: Path, text: str) -> Path:
+    path.write_text(text, "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time,number,r0c0,r0c1,r1c0,r1c1\n0.1,7,1,2,3,4\n0.2,9,5,6,7,300\n",
+        '\ufeffr0c1, number,"r0c0",time,r1c1,r1c0\r\n2,7,1,0.1,4,3\r\n\r\n'
+        "6,9,5,2e-1,300.0,7",
+    ],
+)
+def test_a_table_is_read_by_its_names(tmp_path: Path, text: str) -> None:
+    found = read_frames(table(tmp_path / "a.csv", text))
+    assert found.frames.tolist() == [[[1, 2], [3, 4]], [[5, 6], [7, 300]]]
+    assert (found.times.tolist(), found.numbers.tolist()) == ([0.1, 0.2], [7, 9])
+    assert (found.sensor, found.is_stream) == (Sensor(2, 2, 65535), True)
+
+
+def test_full_and_threshold_of_a_table_may_be_named(tmp_path: Path) -> None:
+    path = table(tmp_path / "a.csv", "r0c0\n1\n255\n")
+    assert read_frames(path).sensor == Sensor(1, 1, 255)
+    assert read_frames(path, full=1023, threshold=4).sensor == Sensor(1, 1, 1023, 4)
+
+
+def test_a_table_is_read_in_blocks(tmp_path: Path) -> None:
+    lines = [f"{place % 251},{place % 256}" for place in range(400_000)]
+    text = "r0c0,r0c1\n" + "\n".join(lines) + "\n"
+    found = read_frames(table(tmp_path / "a.csv", text)).frames
+    assert len(text) > 2**21
+    assert found[:, 0, 0].tolist() == [place % 251 for place in range(400_000)]
+    wrong = table(tmp_path / "b.csv", text + "1,\n")
+    with pytest.raises(ReadError) as caught:
+        read_frames(wrong)
+    whole = "r0c1: '' is no whole number from 0 to 65535"
+    assert str(caught.value) == f"{wrong}:400002: {whole}"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", ": holds no frame"),
+        ("r0c0", ": holds no frame"),
+        ("time,number,r0c0\n", ": holds no frame"),
+        ("r0c0\n1\ncup\n", ":3: r0c0: 'cup' is no whole number from 0 to 65535"),
+        ("r0c0\n1\n1_0\n", ":3: r0c0: '1_0' is no whole number from 0 to 65535"),
+        ("r0c0,r0c1\n1,2.5\n", ":2: r0c1: '2.5' is no whole number from 0 to 65535"),
+        ("r0c0\n-1\n", ":2: r0c0: '-1' is no whole number from 0 to 65535"),
+        ("r0c0\n\n65536\n", ":3: r0c0: '65536' is no whole number from 0 to 65535"),
+        ("time,r0c0\nnan,1\n", ":2: time: 'nan' is no number from 0 to 8589934592"),
+        (
+            "number,r0c0\n9007199254740993,1\n",
+            ":2: number: '9007199254740993' is no whole number from 0 to "
+            "9007199254740991",
+        ),
+        ("r0c0,r0c1\n1,2\n3\n", ":3: 1 cell, and line 1 names 2 columns"),
+        ('r0c0\n"1\n', ":2: broken CSV: a quote is not closed"),
+        ("time,number\n0,0\n", ":1: has no column of a cell such as r0c0"),
+        (
+            "r0c0,r0c1,r1c0\n1,2,3\n",
+            ":1: has no column 'r1c1', and frames of 2 x 2 cells",
+        ),
+        ("r0c0,time,r0c0\n1,2,3\n", ":1: names the column 'r0c0' twice"),
+        (
+            "r0c0;r0c1\n1;2\n",
+            ":1: the column 'r0c0;r0c1' is neither time, number nor a cell such as "
+            "r0c0",
+        ),
+        ("r256c0\n1\n", ":1: a frame has 1 to 256 rows and columns, not 257 x 1"),
+    ],
+    ids=lambda value: value[:32],
+)
+def test_a_table_that_does_not_fit_is_refused_in_a_sentence(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    path = table(tmp_path / "a.csv", text)
+    with pytest.raises(ReadError) as caught:
+        read_frames(path)
+    assert str(caught.value) == f"{path}{message}"
+
+
+def test_a_table_that_is_no_text_or_too_large_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    for content in (b"\xff\xfe", b"r0c0\n\xff\n"):
+        path.write_bytes(content)
+        with pytest.raises(ReadError) as caught:
+            read_frames(path)
+        assert str(caught.value) == f"{path}: is no UTF-8 text; save it as UTF-8"
+    with path.open("wb") as file:
+        file.truncate(2**30 + 1)
+    with pytest.raises(ReadError) as caught:
+        read_frames(path)
+    text = "is larger than 1073741824 bytes, too large to read"
+    assert str(caught.value) == f"{path}: {text}"
+
+
+def test_an_archive_opens_as_frames_of_a_plain_board(tmp_path: Path) -> None:
+    with open_frames(saved(tmp_path / "a.npz", frames=FRAMES, full=1000)) as found:
+        board = Board("frames", Sensor(3, 4, 1000), Marker("AA 55", bits=16))
+        assert isinstance(found, Recording)
+        assert found.board == board
+        assert [frame.time for frame, _ in found] == [0.0, 1 / 44]
+        assert [frame.number for frame, _ in found] == [0, 1]
+        assert [counters.frames for _, counters in found] == [1, 2]
+        assert found.frames.tolist() == FRAMES.tolist()
+
+
+def test_frames_that_do_not_fit_the_board_are_refused(tmp_path: Path) -> None:
+    board = Board("mat", Sensor(3, 4), Marker("AA 55"))
+    path = saved(tmp_path / "a.npz", frames=FRAMES + 240)
+    with pytest.raises(ReadError) as caught:
+        open_frames(path, board)
+    wrong = "r1c0 of frame 1 is 256, and no whole number from 0 to 255"
+    assert str(caught.value) == f"{path}: {wrong}"
+    path = table(tmp_path / "a.csv", "time,r0c0\n0,255\n0,256\n")
+    with pytest.raises(ReadError) as caught:
+        open_frames(path, Board("mat", Sensor(1, 1, 200), Marker("AA 55")))
+    wrong = "r0c0: '256' is no whole number from 0 to 255"
+    assert str(caught.value) == f"{path}:3: {wrong}"

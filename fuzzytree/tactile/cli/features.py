@@ -55,7 +55,7 @@ class TactileFeaturesOptions(FramesOptions):
 @click.command("features", short_help="Turn frames into a table of features.")
 @takes(TactileFeaturesOptions)
 def command(options: TactileFeaturesOptions) -> int:
-    """Compute features of FRAMES, a numpy archive (.npz) or a recording.
+    """Compute features of FRAMES: a recording, an archive (.npz) or a table (.csv).
 
     With -o they become a table for `fuzzytree learn`; without it, the cost of each
     feature in operations is listed. Empty frames are left out and counted. For files

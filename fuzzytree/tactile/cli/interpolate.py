@@ -62,7 +62,7 @@ class TactileInterpolateOptions(FramesOptions):
 @click.command("interpolate", short_help="Interpolate frames; a picture or numbers.")
 @takes(TactileInterpolateOptions)
 def command(options: TactileInterpolateOptions) -> int:
-    """Interpolate FRAMES, a numpy archive (.npz) or a recording, by fuzzy numbers.
+    """Interpolate FRAMES by fuzzy numbers: a recording, an archive (.npz) or a .csv.
 
     An archive gets an array `frames` of what presses on each cell, and an array
     `times_N` of each number of times. `docs/explanation/interpolation.md` has the

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.errors import ReadError, TableError, WriteError
-from fuzzytree.files import PathLike, reason, write_atomically
+from fuzzytree.files import PathLike, open_atomically, reason, write_atomically
 from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.link.starting import still
 from fuzzytree.tactile.sensor import (
@@ -177,8 +177,8 @@ def crc(content: bytes) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
-    """All frames of a recording that are whole.
+class Recording(contextlib.AbstractContextManager["Recording"]):
+    """All frames of a recording that are whole; they are read as a `RecordingFile`.
 
     Attributes:
         board: What sent them, with the baseline that was measured.
@@ -188,7 +188,8 @@ class Recording:
         counters: Of the line, at the last frame.
         damaged: Records in the file that were damaged and are left out.
         cut_bytes: Bytes at the end that are less than a record.
-        started_ns: When the recording began, in nanoseconds since 1970 (UTC).
+        started_ns: When the recording began, in nanoseconds since 1970 (UTC); 0 if
+            that is not known.
     """
 
     board: Board
@@ -199,6 +200,19 @@ class Recording:
     damaged: int
     cut_bytes: int
     started_ns: int
+
+    def __iter__(self) -> Iterator[FrameRecord]:
+        """Give the frames, and how many they are so far."""
+        times, numbers = self.times.tolist(), self.numbers.tolist()
+        rows = zip(self.frames, times, numbers, strict=True)
+        for count, (cells, time_s, number) in enumerate(rows, 1):
+            yield FrameRecord(Frame(cells, time_s, number), Counters(frames=count))
+
+    def close(self) -> None:
+        """Do nothing: all is in memory."""
+
+    def __exit__(self, *_: object) -> None:
+        """Do nothing, either."""
 
 
 class Recorder(contextlib.AbstractContextManager["Recorder"]):
@@ -407,6 +421,38 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
         self.damaged += lost // length
         self.cut_bytes = lost % length
 
+    def whole(self) -> Recording:
+        """Return all frames.
+
+        Raises:
+            ReadError: As iterating, or if they are too many for memory.
+        """
+        sensor, most = self.board.sensor, self.most_frames
+        shape = (most, sensor.rows, sensor.columns)
+        kind = sensor.dtype
+        if math.prod(shape) * kind.itemsize > LARGEST_ARRAY:
+            raise ReadError(
+                f"{self._name}: its {most} frames are more than "
+                f"{LARGEST_ARRAY} bytes, too many for memory"
+            )
+        frames, count = np.empty(shape, kind), 0
+        times, numbers = np.empty(most, np.float64), np.empty(most, np.int64)
+        record = None
+        for record in self:
+            frames[count], times[count] = record.frame.cells, record.frame.time
+            numbers[count] = record.frame.number
+            count += 1
+        return Recording(
+            self.board,
+            frames[:count],
+            times[:count],
+            numbers[:count],
+            record.counters if record else Counters(),
+            self.damaged,
+            self.cut_bytes,
+            self.started_ns,
+        )
+
     def close(self) -> None:
         """Close the file."""
         self._file.close()
@@ -452,6 +498,10 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
         self.sensor = self.board.sensor
 
 
+FrameFile = RecordingFile | Recording
+"""Frames that are read one by one, as often as one likes."""
+
+
 def read_recording(path: PathLike) -> Recording:
     """Return all of a recording; one that is still being written gives what is there.
 
@@ -460,31 +510,20 @@ def read_recording(path: PathLike) -> Recording:
             for memory; `RecordingFile` reads it frame by frame.
     """
     with RecordingFile(path) as file:
-        sensor, most = file.board.sensor, file.most_frames
-        shape = (most, sensor.rows, sensor.columns)
-        kind = sensor.dtype
-        if math.prod(shape) * kind.itemsize > LARGEST_ARRAY:
-            raise ReadError(
-                f"{os.fspath(path)}: its {most} frames are more than "
-                f"{LARGEST_ARRAY} bytes, too many for memory"
-            )
-        frames, count = np.empty(shape, kind), 0
-        times, numbers = np.empty(most, np.float64), np.empty(most, np.int64)
-        record = None
-        for record in file:
-            frames[count], times[count] = record.frame.cells, record.frame.time
-            numbers[count] = record.frame.number
-            count += 1
-        return Recording(
-            file.board,
-            frames[:count],
-            times[:count],
-            numbers[:count],
-            record.counters if record else Counters(),
-            file.damaged,
-            file.cut_bytes,
-            file.started_ns,
-        )
+        return file.whole()
+
+
+def write_recording(path: PathLike, file: FrameFile) -> None:
+    """Write frames as a recording; it is there whole, or not at all.
+
+    Raises:
+        WriteError: If there is a file, or it cannot be written.
+        TableError: If a cell has no place.
+    """
+    with open_atomically(path, replace=False) as output:
+        output.write(header(file.board, file.started_ns))
+        for frame, counters in file:
+            output.write(_packed(frame, counters, file.board))
 
 
 def _to_disk(file: int) -> None:
@@ -543,7 +582,7 @@ class Review:
     counters: Counters
 
 
-def review(file: RecordingFile) -> Review:
+def review(file: FrameFile) -> Review:
     """Return what is in a recording, read frame by frame.
 
     Raises:

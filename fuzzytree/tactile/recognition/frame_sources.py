@@ -13,9 +13,10 @@ import numpy as np
 from fuzzytree.errors import WriteError
 from fuzzytree.files import PathLike
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.link.recording import FrameRecord, Recorder, RecordingFile
+from fuzzytree.tactile.link.recording import FrameRecord, Recorder
+from fuzzytree.tactile.presses import open_frames
 from fuzzytree.tactile.recognition.live import FrameSource
-from fuzzytree.tactile.sensor import Counters, Frame, Sensor
+from fuzzytree.tactile.sensor import FRAMES_A_SECOND, Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import FULL, PAPER, SIDE, press
 
@@ -23,9 +24,6 @@ PAPER_BOARD = Board(
     "simulator", Sensor(SIDE, SIDE, FULL, PAPER.threshold), Marker("AA 55")
 )
 """The board of the simulator."""
-
-FRAMES_A_SECOND = 44
-"""What a board of 16 x 16 cells sends at 115200 baud."""
 
 _RISE, _STAY, _REST = 8, 64, 22  # frames of a simulated press
 
@@ -67,9 +65,9 @@ class Paced:
         return ""
 
     def __iter__(self) -> Iterator[Frame]:
-        """Give the frames, each at its time."""
-        for frame, counters in self._records:
-            if self._speed:
+        """Give the frames: the first one at once, each other one at its time."""
+        for place, (frame, counters) in enumerate(self._records):
+            if self._speed and place:
                 before, went = self._last
                 due = went + (frame.time - before) / self._speed
                 rest = max(due - time.monotonic(), 0.0)
@@ -91,23 +89,27 @@ class Paced:
 
 
 class Replayed(Paced):
-    """Gives the frames of a recording out, as `Paced`.
+    """Gives the frames of a file out, as `Paced`.
 
     Args:
-        path: The recording; it is open until this is closed.
+        path: A recording, which is open until this is closed, or what else
+            `open_frames` takes.
         speed: How many times as fast as they came; 0 for no waiting at all.
+        board: What sent the frames of an archive or a table.
 
     Attributes:
         board: What sent the frames.
 
     Raises:
         ValueError: If the speed is below 0.
-        ReadError: If it is no recording.
+        ReadError: As `open_frames`.
     """
 
-    def __init__(self, path: PathLike, speed: float = 1.0) -> None:
+    def __init__(
+        self, path: PathLike, speed: float = 1.0, board: Board | None = None
+    ) -> None:
         super().__init__((), speed)
-        self._records = self._file = RecordingFile(path)
+        self._records = self._file = open_frames(path, board)
         self.board = self._file.board
 
     @property
