@@ -20,54 +20,66 @@ from fuzzytree.cli import (
     say_rows,
     takes,
 )
-from fuzzytree.files import check_place, open_atomically, write_atomically
+from fuzzytree.files import check_places
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.link.recording import RecordingFile, Review
+    from fuzzytree.tactile.link.recording import FrameFile, Review
 
 
 class TactileReplayOptions(ResultOptions):
     """The arguments and options of the verb."""
 
-    recording: str = argument("FILE")
+    frames: str = argument("FRAMES")
     output: str | None = option(
-        "-o --output FILE", "File for the frames (.csv, .npz) or for the board (.yaml)."
+        "-o --output FILE",
+        "File for the frames (.ftr, .csv, .npz, .h5), for pictures of them (.gif, "
+        ".mp4) or for the board (.yaml).",
+    )
+    board: str | None = option(
+        "--board BOARD.yaml", "File of the board that sent the frames of .npz or .csv."
     )
 
 
 @click.command("replay", short_help="Summarise or convert a recording.")
 @takes(TactileReplayOptions)
 def command(options: TactileReplayOptions) -> None:
-    """Summarise a recording: board, frames, seconds, counters, gaps, damage."""
-    from fuzzytree.tactile.link.recording import RecordingFile, review
+    """Summarise a recording: board, frames, seconds, counters, gaps, damage.
 
+    FRAMES is a recording, a numpy archive (.npz) or a table (.csv); -o x.ftr makes a
+    recording of these. Without times there are 44 frames a second, and without --board
+    a plain board.
+    """
+    from fuzzytree.tactile.board_file import load_board
+    from fuzzytree.tactile.link.recording import review
+    from fuzzytree.tactile.presses import open_frames
+    from fuzzytree.tactile.writers import WRITERS
+
+    suffix = Path(options.output or "").suffix.lower()
     if options.output is not None:
-        check_place(options.output)
-        if Path(options.output).suffix not in _WRITERS:
-            raise click.UsageError(
-                f"-o writes .csv, .npz or .yaml, not {options.output}"
-            )
-    with RecordingFile(options.recording) as file:
+        check_places([options.output], [options.frames])
+        if suffix not in WRITERS:
+            known = ", ".join(WRITERS)
+            raise click.UsageError(f"-o writes {known}, not {options.output}")
+    board = None if options.board is None else load_board(options.board)
+    with open_frames(options.frames, board) as file:
         found = review(file)
         if options.as_json:
             facts = {"board": file.board, "started": _started(file)}
             answer_json({**facts, **asdict(found)})
         else:
-            answer("\n".join(_lines(options.recording, file, found)))
+            answer("\n".join(_lines(options.frames, file, found)))
         if options.output is not None:
-            _WRITERS[Path(options.output).suffix](
-                options.output, options.recording, file
-            )
+            WRITERS[suffix](options.output, file)
             sensor = file.board.sensor
             rests = any(sensor.baseline) or bool(sensor.masked)
-            is_bare = Path(options.output).suffix == ".npz" and rests
+            is_bare = suffix in (".csv", ".npz") and rests
             hint = "without baseline and mask: give its board with --board"
             say_rows(
                 ("wrote", options.output, hint if is_bare else ""), quiet=options.quiet
             )
 
 
-def _lines(name: str, file: RecordingFile, found: Review) -> Iterator[str]:
+def _lines(name: str, file: FrameFile, found: Review) -> Iterator[str]:
     """Yield what is in a recording, in words."""
     from fuzzytree.report import counted
     from fuzzytree.tactile.link.starting import named
@@ -81,7 +93,8 @@ def _lines(name: str, file: RecordingFile, found: Review) -> Iterator[str]:
     seconds = found.seconds
     rate = f", {(found.frames - 1) / seconds:.1f} a second" if seconds > 0 else ""
     frames = counted(found.frames, "frame")
-    yield f"frames    {frames} in {seconds:.1f} s{rate}; begun {_started(file)}"
+    begun = f"; begun {_started(file)}" if file.started_ns else ""
+    yield f"frames    {frames} in {seconds:.1f} s{rate}{begun}"
     if sensor.baseline:
         yield f"baseline  {min(sensor.baseline)} to {max(sensor.baseline)}"
     if sensor.masked:
@@ -99,47 +112,11 @@ def _lines(name: str, file: RecordingFile, found: Review) -> Iterator[str]:
     yield f"counted   {', '.join(f'{name} {count}' for name, count in counters)}"
 
 
-def _started(file: RecordingFile) -> str:
+def _started(file: FrameFile) -> str | None:
+    """Return when a recording began; None if that is not known."""
+    if not file.started_ns:
+        return None
     begin = datetime(1970, 1, 1, tzinfo=UTC)
     with contextlib.suppress(OverflowError):
         begin += timedelta(microseconds=file.started_ns // 1000)
     return begin.isoformat(timespec="milliseconds")
-
-
-def _write_table(output: str, _: str, file: RecordingFile) -> None:
-    """Write a line for each frame: its time, its number, and its cells."""
-    sensor = file.board.sensor
-    names = [f"r{r}c{c}" for r in range(sensor.rows) for c in range(sensor.columns)]
-    with open_atomically(output) as table:
-        table.write(",".join(["time", "number", *names]).encode() + b"\n")
-        for frame, _counters in file:
-            cells = ",".join(map(str, frame.cells.reshape(-1).tolist()))
-            table.write(f"{frame.time!r},{frame.number},{cells}\n".encode())
-
-
-def _write_arrays(output: str, name: str, _: RecordingFile) -> None:
-    """Write a numpy archive that the other actions read."""
-    import numpy as np
-
-    from fuzzytree.tactile.link.recording import read_recording
-    from fuzzytree.tactile.presses import packed_arrays
-
-    found = read_recording(name)
-    arrays = {
-        "frames": found.frames,
-        "full": np.array(found.board.sensor.full),
-        "threshold": np.array(found.board.sensor.threshold),
-        "times": found.times,
-        "numbers": found.numbers,
-    }
-    write_atomically(output, packed_arrays(arrays))
-
-
-def _write_board(output: str, _: str, file: RecordingFile) -> None:
-    """Write the board, with what was measured, as its file."""
-    from fuzzytree.tactile.board_file import board_text
-
-    write_atomically(output, board_text(file.board).encode())
-
-
-_WRITERS = {".csv": _write_table, ".npz": _write_arrays, ".yaml": _write_board}

@@ -230,7 +230,7 @@ def test_damage_baseline_masks_and_dead_cells_are_reported(
 ) -> None:
     sensor = Sensor(4, 5, baseline=tuple(range(20)), masked=((0, 1), (3, 4)))
     board = Board("mat", sensor, Marker("AA 55"))
-    with Recorder("b.ftr", board, started_ns=0) as recorder:
+    with Recorder("b.ftr", board, started_ns=1_000) as recorder:
         for number in range(5):
             cells = _cells(number)
             cells[2, 2] = 0
@@ -298,6 +298,59 @@ def test_frames_become_arrays_that_other_actions_read(call: Call, place: Path) -
     assert err == f"wrote    m.npz {hint}\n"
 
 
+@pytest.mark.parametrize("name", ["a.csv", "a.npz"])
+def test_a_table_or_archive_becomes_the_recording_again(
+    call: Call, place: Path, name: str
+) -> None:
+    assert call("tactile", "replay", "a.ftr", "-o", name)[0] == 0
+    words = ("tactile", "replay", name, "--board", "mat.yaml", "-o", "b.ftr")
+    assert call(*words)[::2] == (0, "wrote    b.ftr\n")
+    before, after = read_recording("a.ftr"), read_recording("b.ftr")
+    assert (after.board, after.started_ns) == (BOARD, 0)
+    for attribute in ("frames", "times", "numbers"):
+        assert (getattr(after, attribute) == getattr(before, attribute)).all()
+    content = Path("b.ftr").read_bytes()
+    code, _, err = call(*words)
+    assert (code, err) == (2, "b.ftr: is there already\n")
+    assert Path("b.ftr").read_bytes() == content
+    found = json.loads(call("tactile", "replay", "b.ftr", "--json")[1])
+    assert (found["started"], found["frames"], found["missing"]) == (None, 6, 6)
+
+
+def test_a_table_without_a_board_gets_a_plain_one(call: Call, place: Path) -> None:
+    Path("b.csv").write_text("r0c0,r0c1\n1,300\n3,4\n")
+    code, out, _ = call("tactile", "replay", "b.csv", "-o", "b.ftr")
+    assert (code, out.splitlines()[:2]) == (
+        0,
+        [
+            "b.csv: frames, 1 x 2 cells, full 65535, marker, 115200 baud",
+            "frames    2 frames in 0.0 s, 44.0 a second",
+        ],
+    )
+    board = read_recording("b.ftr").board
+    assert board == Board("frames", Sensor(1, 2, 65535), Marker("AA 55", bits=16))
+
+
+def test_what_is_no_table_or_archive_leaves_no_recording(
+    call: Call, place: Path
+) -> None:
+    Path("b.csv").write_text("time,number,r0c0\n0.0,0,1\n0.5,1,one\n")
+    code, out, err = call("tactile", "replay", "b.csv", "-o", "b.ftr")
+    text = "b.csv:3: r0c0: 'one' is no whole number from 0 to 65535"
+    assert (code, out, err) == (2, "", f"{text}\n")
+    assert call("tactile", "replay", "a.ftr", "-o", "a.npz")[0] == 0
+    Path("b.npz").write_bytes(Path("a.npz").read_bytes()[:-30])
+    code, out, err = call("tactile", "replay", "b.npz", "-o", "b.ftr")
+    text = "b.npz: is no numpy archive (.npz): File is not a zip file"
+    assert (code, out, err) == (2, "", f"{text}\n")
+    assert not Path("b.ftr").exists()
+
+
+def test_a_recording_becomes_a_picture_that_moves(call: Call, place: Path) -> None:
+    assert call("tactile", "replay", "a.ftr", "-o", "a.GIF")[2] == "wrote    a.GIF\n"
+    assert Path("a.GIF").read_bytes().startswith(b"GIF89a")
+
+
 def test_the_board_of_a_recording_becomes_its_file(call: Call, place: Path) -> None:
     assert call("tactile", "replay", "a.ftr", "-o", "b.yaml")[0] == 0
     assert load_board("b.yaml") == BOARD
@@ -306,7 +359,15 @@ def test_the_board_of_a_recording_becomes_its_file(call: Call, place: Path) -> N
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("a.ftr", "-o", "a.txt"), "-o writes .csv, .npz or .yaml, not a.txt"),
+        (
+            ("a.ftr", "-o", "a.txt"),
+            "-o writes .ftr, .csv, .npz, .h5, .gif, .mp4, .yaml, not a.txt",
+        ),
+        (("a.ftr", "-o", "./a.ftr"), "./a.ftr: cannot be written: it is read as well"),
+        (
+            ("a.ftr", "--board", "mat.yaml"),
+            "a.ftr: a recording has its own board; name no other one",
+        ),
         (("mat.yaml",), "mat.yaml: is no recording of a board"),
         (("none",), "none: cannot be read: no such file or directory"),
         (
