@@ -44,9 +44,11 @@ def open(
     and `y`. `tare()` takes what the cells read next for their baseline.
 
     Args:
-        source: A serial port, a recording, or `simulator`.
+        source: A serial port, a recording, an archive (.npz) or a table (.csv) of
+            frames, or `simulator`.
         model: A tree or a rule base whose inputs are names of features, or its file.
-        board: What is connected to the port, or its file; none for other sources.
+        board: What is connected to the port, or sent the frames of an archive or a
+            table, or its file; none for other sources.
         reject: The strength below which an object is unknown; the usual one if None.
         vote_s: How many seconds the answers to an object vote; 0 for each frame's own.
         least_area: The fewest cells of an object.

@@ -37,7 +37,11 @@ class TactileLiveOptions:
     model: str = option(
         "--model MODEL", "Model to run: a tree or a rule base.", required=True
     )
-    board: str | None = option("--board BOARD.yaml", "File of the board on the port.")
+    board: str | None = option(
+        "--board BOARD.yaml",
+        "File of the board on the port, or of that which sent the frames of .npz or "
+        ".csv.",
+    )
     reject: float | None = option(
         "--reject SHARE",
         "Firing strength below which an object is unknown; "
@@ -101,10 +105,11 @@ class TactileLiveOptions:
 def command(options: TactileLiveOptions) -> int:
     """Recognise the objects on the sensor, frame by frame.
 
-    SOURCE is a serial port, a recording, or `simulator`: the paper's objects one after
-    another. A terminal shows a picture, the classes and the strengths, and takes the
-    keys t (tare), s and i; elsewhere there is a line for each object that is newly
-    recognised. Ctrl-C ends. Exit 1 if --record ended before.
+    SOURCE is a serial port, a recording, frames in a numpy archive (.npz) or a table
+    (.csv), or `simulator`: the paper's objects one after another. A terminal shows a
+    picture, the classes and the strengths, and takes the keys t (tare), s and i;
+    elsewhere there is a line for each object that is newly recognised. Ctrl-C ends.
+    Exit 1 if --record ended before.
     """
     from fuzzytree.tactile.recognition.recogniser import usual_floor
     from fuzzytree.tactile.recognition.sensing import open_sensor

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -117,9 +118,11 @@ def open_sensor(
     """Open a sensor, measure its baseline, and begin to read frames.
 
     Args:
-        source: A serial port, a recording, or `simulator`.
+        source: A serial port, a recording, an archive (.npz) or a table (.csv) of
+            frames, or `simulator`.
         model: A tree or a rule base whose inputs are names of features.
-        board: What is connected to the port, or its file; none for other sources.
+        board: What is connected to the port, or sent the frames of an archive or a
+            table, or its file; none for other sources.
         reject: The strength below which an object is unknown; the usual one if None.
         vote_s: How long the answers to an object vote; 0 for each frame's own.
         least_area: The fewest cells of an object.
@@ -142,9 +145,10 @@ def open_sensor(
         stack.callback(found.close)
         recorded: sources.Recorded | None = None
         if record is not None:
+            line = found
             found = recorded = sources.Recorded(found, Recorder(record, used))
             stack.callback(recorded.end)
-            if board is not None:
+            if isinstance(line, Connection):
                 found = sources.Newest(recorded, MOST_WAITING)
                 stack.callback(found.close)
         live = Live(
@@ -171,19 +175,18 @@ def _source(
     say: Callable[[str, str], None] | None,
 ) -> tuple[FrameSource, Board, list[str]]:
     """Return where frames come from, the board that they fit, and remarks on it."""
-    is_file = Path(source).is_file()
-    if board is not None and (source == SIMULATOR or is_file):
-        raise ValueError(f"a board is for a port; {source} has its own")
     if source == SIMULATOR:
+        if board is not None:
+            raise ValueError(f"a board is for a port; {source} has its own")
         paced = sources.Paced(sources.simulated(seed), speed)
         return paced, sources.PAPER_BOARD, []
-    if is_file:
-        replayed = sources.Replayed(source, speed)
+    known = load_board(board) if isinstance(board, str | os.PathLike) else board
+    if Path(source).is_file():
+        replayed = sources.Replayed(source, speed, known)
         return replayed, replayed.board, []
-    if board is None:
+    if known is None:
         text = f"{source} is no recording; for a port, name its board"
         raise ValueError(text)
-    known = board if isinstance(board, Board) else load_board(board)
     most = MOST_WAITING if record is None else room(known)
     line = open_connection(known, source, most_waiting=most)
     try:

@@ -33,8 +33,9 @@ from fuzzytree.errors import WriteError
 from fuzzytree.tactile.board_file import board_text
 from fuzzytree.tactile.boards import Board, Marker, Start
 from fuzzytree.tactile.cli.screen import look_of
-from fuzzytree.tactile.link.recording import Recorder, read_recording
+from fuzzytree.tactile.link.recording import Recorder, RecordingFile, read_recording
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
+from fuzzytree.tactile.writers import WRITERS
 
 Call = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[3]
@@ -184,6 +185,36 @@ def test_a_model_of_other_features_is_refused_by_name(call: Call) -> None:
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize("name", ["some.csv", "some.npz"])
+def test_frames_of_a_table_or_archive_are_recognised_as_those_of_a_recording(
+    call: Call, name: str
+) -> None:
+    with RecordingFile("some.ftr") as file:
+        WRITERS[Path(name).suffix](name, file)
+    words = ("--model", "area.yaml", "--speed", "0", "--lines")
+    expected = call("some.ftr", *words)[1]
+    assert expected.count("object") > 1
+    assert call(name, *words)[:2] == (0, expected)
+    recorded = call(name, *words, "--board", "mat.yaml", "--record", "b.ftr")
+    assert recorded[:2] == (0, expected)
+    before, after = read_recording("some.ftr"), read_recording("b.ftr")
+    assert after.board == BOARD
+    assert after.frames.tolist() == before.frames.tolist()
+
+
+def test_a_table_of_another_size_than_its_board_is_reported(call: Call) -> None:
+    Path("a.csv").write_text("r0c0,r0c1\n1,2\n")
+    code, _, err = call("a.csv", "--model", "area.yaml", "--board", "mat.yaml")
+    text = "a.csv: holds frames of 1 x 2 cells, and the board has 4 x 4"
+    assert (code, err) == (2, f"{text}\n")
+
+
+def test_a_recording_with_another_board_is_reported(call: Call) -> None:
+    code, _, err = call("some.ftr", "--model", "area.yaml", "--board", "mat.yaml")
+    text = "some.ftr: a recording has its own board; name no other one"
+    assert (code, err) == (2, f"{text}\n")
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
@@ -192,8 +223,8 @@ def test_a_model_of_other_features_is_refused_by_name(call: Call) -> None:
             "none.ftr is no recording; for a port, name its board",
         ),
         (
-            ("some.ftr", "--board", "mat.yaml"),
-            "a board is for a port; some.ftr has its own",
+            ("simulator", "--board", "mat.yaml"),
+            "a board is for a port; simulator has its own",
         ),
     ],
 )
