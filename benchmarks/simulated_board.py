@@ -48,12 +48,8 @@ from fuzzytree.tactile.boards import (
 )
 from fuzzytree.tactile.cli.signals import stop_signal
 from fuzzytree.tactile.link.fixed import layout_of
-from fuzzytree.tactile.recognition.frame_sources import (
-    FRAMES_A_SECOND,
-    Replayed,
-    simulated,
-)
-from fuzzytree.tactile.sensor import Cells, check_frames
+from fuzzytree.tactile.recognition.frame_sources import Replayed, simulated
+from fuzzytree.tactile.sensor import FRAMES_A_SECOND, Cells, check_frames
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import FULL
 

@@ -332,8 +332,8 @@ def test_compiled_c_has_the_strengths_of_every_rule_on_every_wine(
     models: list[Model] = [tree, relative, raw, product]
     for model in models:
         table = read_table(WINE, target="cultivar")
-        columns = [table.columns.index(name) for name in model.inputs]
-        values = np.asarray(table.values[columns], np.float64)
+        places = [table.columns.index(name) for name in model.inputs]
+        values = np.asarray(table.values[places], np.float64)
         assert values.shape[1] == 178
         found = find_runtime("c").load(model)(values)
         right = find_runtime("reference").load(model)(values)
