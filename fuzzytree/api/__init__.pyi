@@ -5,6 +5,7 @@ from .holdout import Accuracy as Accuracy
 from .holdout import Summary as Summary
 from .holdout import accuracy as accuracy
 from .holdout import front as front
+from .holdout import grouped as grouped
 from .holdout import majority as majority
 from .leaf_counts import LeafCounts as LeafCounts
 from .verbs import audit as audit

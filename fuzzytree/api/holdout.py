@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
+from fuzzytree.errors import TableError
 from fuzzytree.learning import (
     ArrayLearner,
     Front,
@@ -136,6 +137,7 @@ def accuracy(
     *,
     folds: int = FOLDS,
     seed: int = 0,
+    groups: IntArray | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Accuracy | None:
     """Learn without each fold in turn, and count how often the tree answers it right.
@@ -145,6 +147,7 @@ def accuracy(
         settings: How to learn.
         folds: How many folds.
         seed: Of the shuffle.
+        groups: A number for each row; rows of the same number are in the same fold.
         progress: Called with what is done and which share of it.
 
     Returns:
@@ -156,7 +159,13 @@ def accuracy(
     if len(rows) < _FEWEST:
         return None
     codes = table.codes[rows]
-    fold = folds_of(codes, folds, seed)
+    if groups is None:
+        fold = folds_of(codes, folds, seed)
+    else:
+        _, first, group = np.unique(
+            groups[rows], return_index=True, return_inverse=True
+        )
+        fold = folds_of(codes[first], folds, seed)[group]
     shares: list[float] = []
     weights = _weights(table, settings)
     most = min(_CLASSES // len(table.classes), _COLUMNS // width)
@@ -165,6 +174,8 @@ def accuracy(
         if progress:
             progress(f"testing fold {number + 1} of {tried}", number / tried)
         kept, test = rows[fold != number], rows[fold == number]
+        if not len(test):  # there are fewer groups than folds
+            continue
         present, known = np.unique(table.codes[kept], return_inverse=True)
         if len(present) < 2:
             return None
@@ -182,7 +193,42 @@ def accuracy(
         right = predicted == table.codes[test]
         weight = None if weights is None else weights[test]
         shares.append(float(np.average(right, weights=weight)))
-    return Accuracy(tuple(shares), len(rows), table.rows)
+    return Accuracy(tuple(shares), len(rows), table.rows) if shares else None
+
+
+def grouped(table: Table, column: str) -> tuple[Table, IntArray]:
+    """Return a table without a column, and the group of each row that it states.
+
+    Raises:
+        TableError: If there is no such column, or a row has no group.
+
+    Example:
+        >>> from fuzzytree.tables import read_table, table
+        >>> rows = np.array([[1.0, 7.0], [2.0, 7.0], [3.0, 9.0]])
+        >>> rows = table(rows, columns=["x", "press"])
+        >>> whole = read_table(rows, target=["a", "a", "b"])
+        >>> rest, groups = grouped(whole, "press")
+        >>> rest.columns, groups.tolist()
+        (('x',), [0, 0, 1])
+    """
+    if column not in table.columns:
+        known = ", ".join(table.columns[:20])
+        text = f"there is no column {column!r} of groups; there is {known}"
+        raise TableError(f"{table.name}: {text}")
+    place = table.columns.index(column)
+    values = table.values[place]
+    if np.isnan(values).any():
+        row = int(np.isnan(values).argmax()) + 1
+        raise TableError(f"{table.name}: row {row} has no group in {column!r}")
+    kept = [k for k in range(len(table.columns)) if k != place]
+    rest = msgspec.structs.replace(
+        table,
+        columns=tuple(table.columns[k] for k in kept),
+        values=table.values[kept],
+        categories={k: v for k, v in table.categories.items() if k != column},
+        dates=tuple(name for name in table.dates if name != column),
+    )
+    return rest, np.unique(values, return_inverse=True)[1].astype(np.int64)
 
 
 def front(table: Table, settings: LearningSettings) -> Front | None:

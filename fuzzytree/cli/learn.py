@@ -48,11 +48,14 @@ if TYPE_CHECKING:
         LearningSettings,
         Learnt,
     )
-    from fuzzytree.model import FuzzyTree
+    from fuzzytree.model import FuzzyTree, IntArray
     from fuzzytree.tables import Table
 
 State = TypeVar("State", "Learner", "LeafCounts")
 Lines = list[tuple[str, str, str]]
+
+FEW_GROUPS = 10
+"""Groups of a class below which its accuracy says little."""
 Progress = Callable[[str, float], None]
 
 
@@ -74,6 +77,11 @@ class LearnOptions(RepresentationOptions):
         "--weight COLUMN",
         "Column that holds the weight of each row, and is no input; 3 counts as three "
         "equal rows, 0 leaves the row out.",
+    )
+    groups: str | None = option(
+        "--groups COLUMN",
+        "Column, no input, whose equal rows belong together, such as a person or a "
+        "placement: cross-validation never learns from a group that it tests on.",
     )
     ignore: Sequence[str] = ignore_option
     categorical: Sequence[str] = categorical_option
@@ -195,7 +203,7 @@ def _learnt(
     options: LearnOptions, *, is_state: bool
 ) -> tuple[FuzzyTree, Lines, object]:
     """Return a tree of all rows, what to say about it, and the facts."""
-    from fuzzytree.api import accuracy, front, learn_table
+    from fuzzytree.api import accuracy, front, grouped, learn_table
     from fuzzytree.learning import remarks
     from fuzzytree.report import counted
     from fuzzytree.tables import Table
@@ -206,6 +214,13 @@ def _learnt(
     with progress_bar(quiet=is_silent) as show:
         result = _read(options, settings, show, is_state=is_state)
     found = result if isinstance(result, Table) else result.table()
+    groups: IntArray | None = None
+    if options.groups is not None:
+        if not isinstance(result, Table):
+            text = "the table is larger than memory, or a state, which has no rows"
+            raise click.UsageError(f"--groups: {text}")
+        result, groups = grouped(found, options.groups)
+        found = result
     read = ("read", found.name, _timed(_read_text(found), begin))
     noticed = dict(remarks(found, lambda column: f"--ignore {shlex.quote(column)}"))
     begin = time.perf_counter()
@@ -232,16 +247,37 @@ def _learnt(
     if not options.no_test:
         begin = time.perf_counter()
         with progress_bar(quiet=is_silent) as show:
-            tested = accuracy(found, settings, seed=settings.seed, progress=show)
+            tested = accuracy(
+                found, settings, seed=settings.seed, groups=groups, progress=show
+            )
         said = _timed(_accuracy_text(tested, found, settings), begin)
+        if groups is not None:
+            said = f"folds of whole groups; {said}"
+            rows += _few_groups(found, groups)
         rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
-        small = front(found, settings)
+        if groups is None:  # its folds know none
+            small = front(found, settings)
         rows += _front_rows(small)
     if options.front is not None:
         rows.append(_drawn(small, options.front, _title(options)))
     facts = _summary(found, noticed, learnt, tested, settings, options.output)
     facts = msgspec.structs.replace(facts, front=small)
     return tree, rows, facts
+
+
+def _few_groups(table: Table, groups: IntArray) -> Lines:
+    """Return a line for each class of few groups: its accuracy says little."""
+    import numpy as np
+
+    from fuzzytree.report import counted
+
+    rows: Lines = []
+    for code, name in enumerate(table.classes):
+        count = len(np.unique(groups[table.codes == code]))
+        if count < FEW_GROUPS:
+            text = f"below {FEW_GROUPS}, more of its rows will be strange to the tree"
+            rows.append(("few", name, f"{counted(count, 'group')}: {text}"))
+    return rows
 
 
 def _front_rows(small: Front | None) -> Lines:

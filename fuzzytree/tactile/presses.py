@@ -99,6 +99,8 @@ class Presses:
         is_stream: Whether the frames follow each other, as in a recording.
         times: Shape (frames,): in seconds; empty if they are not known.
         numbers: Shape (frames,): of each frame; empty if they are not known.
+        placement: Shape (frames,): when something was put down, from 1; empty if each
+            frame is a placement of its own.
     """
 
     frames: Cells
@@ -109,27 +111,7 @@ class Presses:
     is_stream: bool = False
     times: npt.NDArray[np.float64] = field(default_factory=_no_times)
     numbers: npt.NDArray[np.int64] = field(default_factory=_unknown)
-
-    def placements(self, is_pressed: npt.NDArray[np.bool_]) -> dict[str, int]:
-        """Return how often something was put down, for each class that is known.
-
-        In a stream that is once from one empty frame to the next, else once a frame.
-
-        Args:
-            is_pressed: Shape (frames,): whether anything presses.
-
-        Example:
-            >>> cells = np.ones((4, 1, 1), np.uint8)
-            >>> cup = Presses(cells, Sensor(1, 1), is_stream=True).of_class("cup")
-            >>> cup.placements(np.array([True, True, False, True]))
-            {'cup': 2}
-        """
-        is_begun = is_pressed.copy()
-        if self.is_stream:
-            is_begun[1:] &= ~is_pressed[:-1]
-        codes = self.label[is_begun] if len(self.label) else self.label
-        counts = np.bincount(codes, minlength=len(self.label_names)).tolist()
-        return dict(zip(self.label_names, counts, strict=True))
+    placement: npt.NDArray[np.int64] = field(default_factory=_unknown)
 
     def of_class(self, name: str) -> Presses:
         """Return the same frames, all of one class."""

@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 
 from fuzzytree.api import holdout
-from fuzzytree.api.holdout import Accuracy, accuracy, folds_of, majority, sampled
+from fuzzytree.api.holdout import (
+    Accuracy,
+    accuracy,
+    folds_of,
+    grouped,
+    majority,
+    sampled,
+)
+from fuzzytree.errors import TableError
 from fuzzytree.learning import LearningSettings
-from fuzzytree.tables import Table, read_table
+from fuzzytree.tables import Table, read_table, table
 
 
 def _table(rows: int, *, classes: int = 2) -> Table:
@@ -114,3 +122,32 @@ def test_a_table_of_100_000_columns_is_tested_in_two_folds() -> None:
     result = accuracy(table, LearningSettings())
     assert result is not None
     assert result.folds == (1.0, 1.0)
+
+
+def test_folds_of_whole_groups_do_not_learn_from_what_they_test_on() -> None:
+    random = np.random.default_rng(0)
+    places = random.normal(size=(20, 3))  # of groups, each of 10 rows that are alike
+    labels = np.arange(20) % 2  # which say nothing of the places
+    values = np.repeat(places, 10, axis=0) + random.normal(0.0, 1e-3, (200, 3))
+    rows = np.column_stack([values, np.repeat(np.arange(20.0), 10)])
+    source = table(rows, columns=["a", "b", "c", "group"])
+    whole = read_table(source, target=np.repeat(labels, 10).tolist())
+    rest, groups = grouped(whole, "group")
+    assert rest.columns == ("a", "b", "c")
+    alone = accuracy(rest, LearningSettings())
+    together = accuracy(rest, LearningSettings(), groups=groups)
+    assert alone is not None
+    assert together is not None
+    assert alone.mean > 0.9  # a row of the same group was learnt
+    assert together.mean < 0.75
+
+
+def test_a_column_of_groups_must_be_there_for_every_row() -> None:
+    rows = np.array([[1.0, np.nan], [2.0, 1.0]])
+    found = read_table(table(rows, columns=["x", "who"]), target=["a", "b"])
+    with pytest.raises(TableError, match="row 1 has no group in 'who'"):
+        grouped(found, "who")
+    with pytest.raises(
+        TableError, match="no column 'press' of groups; there is x, who"
+    ):
+        grouped(found, "press")

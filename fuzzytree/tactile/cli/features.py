@@ -7,6 +7,7 @@ import io
 import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,12 +30,15 @@ if TYPE_CHECKING:
     from fuzzytree.tactile.presses import Presses
     from fuzzytree.tactile.runtimes.frames import Features
 
-USUAL = "log orientation / force"
-"""Features that hardly depend on the force of a press and on the gain of the sensor."""
+USUAL = "log orientation / force,log area"
+"""Features that depend little on the force of a press and on the gain of the sensor."""
 
 FEW_PLACEMENTS = 10
 CLASS = "class"
 """The column of the classes."""
+
+PLACEMENT = "placement"
+"""The column of the placements, from 1, of frames that follow each other."""
 
 
 class TactileFeaturesOptions(FramesOptions):
@@ -59,7 +63,8 @@ def command(options: TactileFeaturesOptions) -> int:
 
     With -o they become a table for `fuzzytree learn`; without it, the cost of each
     feature in operations is listed. Empty frames are left out and counted. For files
-    of one class each, write CLASS=FILE: cup=cup.ftr pen=pen.ftr.
+    of one class each, write CLASS=FILE: cup=cup.ftr pen=pen.ftr. Of a recording each
+    frame is seen as `live` sees it: the object of the largest force, without drift.
     """
     from fuzzytree.tactile.features import costs
     from fuzzytree.tactile.features.names import names_of
@@ -68,11 +73,12 @@ def command(options: TactileFeaturesOptions) -> int:
         check_place(options.output)
     with wrong_options():
         names = names_of(options.text)
-    parts = [*_parts(options)]
+    counts: Counter[str] = Counter()
+    parts = [*_parts(options, counts)]
     _check_alike(options.frames, parts)
     found = costs(parts[0].sensor, names)
     if options.output is not None:
-        return _table(options, options.output, parts, found)
+        return _table(options, options.output, parts, found, counts)
     if options.as_json:
         answer_json({"costs": found})
     else:
@@ -81,8 +87,17 @@ def command(options: TactileFeaturesOptions) -> int:
     return 0
 
 
-def _parts(options: TactileFeaturesOptions) -> Iterator[Presses]:
-    """Yield the frames of each file, of the class that stands before its name."""
+def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[Presses]:
+    """Yield the frames of each file, of the class that stands before its name.
+
+    Count frames with saturated cells, with several objects, and placements.
+    """
+    from fuzzytree.tactile.boards import Board, Marker
+    from fuzzytree.tactile.presses import open_frames
+    from fuzzytree.tactile.recognition.objects import followed
+    from fuzzytree.tactile.sensor import saturated
+
+    placed = 0
     for text in options.frames:
         word, sign, path = text.partition("=")
         if not sign or Path(text).exists():
@@ -92,6 +107,21 @@ def _parts(options: TactileFeaturesOptions) -> Iterator[Presses]:
                 f"of several files, each has a class: CLASS={path}, not {path}"
             )
         found = frames_of_options(path, options, label=options.label)
+        if found.is_stream:
+            plain = Board("frames", found.sensor, Marker("AA 55", found.sensor.bits))
+            is_table = Path(path).suffix.lower() == ".csv"
+            with open_frames(path, plain if is_table else None) as file:
+                seen = followed(file, found.sensor)
+            counts["saturated"] += seen.saturated
+            counts["several"] += seen.several
+            placements = seen.placements + placed
+            placed = int(placements.max(initial=placed))
+            found = replace(
+                found, frames=seen.frames, sensor=seen.sensor, placement=placements
+            )
+        else:
+            full = saturated(found.sensor, found.frames) > 0
+            counts["saturated"] += int(full.sum())
         yield found.of_class(word) if word else found
 
 
@@ -114,6 +144,8 @@ def _check_alike(frames: Sequence[str], parts: Sequence[Presses]) -> None:
             )
         if bool(len(part.subject)) != bool(len(parts[0].subject)):
             raise ReadError(f"of {name} and {frames[0]}, only one states subjects")
+        if bool(len(part.placement)) != bool(len(parts[0].placement)):
+            raise ReadError(f"of {name} and {frames[0]}, only one is a recording")
 
 
 def _table(
@@ -121,10 +153,10 @@ def _table(
     output: str,
     parts: Sequence[Presses],
     costs: Mapping[str, float],
+    counted_frames: Counter[str],
 ) -> int:
     from fuzzytree.report import counted
     from fuzzytree.tactile.runtimes.frames import features_of
-    from fuzzytree.tactile.sensor import saturated
 
     names = [*costs]
     found = [features_of(part.sensor, part.frames, names) for part in parts]
@@ -135,7 +167,7 @@ def _table(
     write_atomically(output, content)
     presses, sensor = parts[0], parts[0].sensor
     counts = [len(part.frames) for part in parts]
-    full = sum(int((saturated(part.sensor, part.frames) > 0).sum()) for part in parts)
+    full, several = counted_frames["saturated"], counted_frames["several"]
     none = sum(int((~part.is_pressed).sum()) for part in found)
     size = f"{sensor.rows} x {sensor.columns} cells"
     rows = [
@@ -145,17 +177,20 @@ def _table(
     if none:
         rows.append(("left out", counted(none, "frame"), "nothing presses"))
     if full:
-        text = f"a cell reads {sensor.full} or more"
-        rows.append(("full", counted(full, "frame"), text))
-    placed: Counter[str] = Counter()
-    for part, one in zip(parts, found, strict=True):
-        placed.update(part.placements(one.is_pressed))
+        rows.append(("full", counted(full, "frame"), "a cell takes no more"))
+    if several:
+        text = "several objects: the one of the largest force counts"
+        rows.append(("several", counted(several, "frame"), text))
+    placed = _placed(parts, found)
     for name, count in placed.items():
         if count < FEW_PLACEMENTS:
             text = f"below {FEW_PLACEMENTS}, `live` finds more of its presses unknown"
             rows.append(("few", name, f"{counted(count, 'placement')}: {text}"))
     after = ["fuzzytree", "learn", output, "--target", CLASS, "-o", "tree.yaml"]
-    after += ["--ignore", "subject"] if len(presses.subject) else []
+    if len(presses.subject):
+        after += ["--groups", "subject"]
+    elif len(presses.placement):
+        after += ["--groups", PLACEMENT]
     text = f"next: {shlex.join(after)}" if len(presses.label) else "without classes"
     rows.append(("wrote", output, f"{counted(len(names), 'feature')}; {text}"))
     say_rows(*rows, quiet=options.quiet)
@@ -167,11 +202,23 @@ def _table(
                 "nothing": none,
                 "placements": placed,
                 "saturated": full,
+                "several": several,
                 "features": names,
                 "costs": costs,
             }
         )
     return 0
+
+
+def _placed(parts: Sequence[Presses], found: Sequence[Features]) -> dict[str, int]:
+    """Return how often something was put down, for each class that is known."""
+    placed: Counter[str] = Counter()
+    for part, features in zip(parts, found, strict=True):
+        for code, name in enumerate(part.label_names if len(part.label) else ()):
+            rows = (part.label == code) & features.is_pressed
+            numbers = part.placement[rows] if len(part.placement) else []
+            placed[name] += len({*numbers}) if len(part.placement) else int(rows.sum())
+    return dict(placed)
 
 
 def _csv(parts: Sequence[Presses], found: Sequence[Features]) -> str:
@@ -181,6 +228,7 @@ def _csv(parts: Sequence[Presses], found: Sequence[Features]) -> str:
     heads = [*found[0].names]
     heads += [CLASS] if has_class else []
     heads += ["subject"] if has_subject else []
+    heads += [PLACEMENT] if len(parts[0].placement) else []
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(heads)
@@ -191,5 +239,7 @@ def _csv(parts: Sequence[Presses], found: Sequence[Features]) -> str:
             columns.append([part.label_names[code] for code in part.label[rows]])
         if has_subject:
             columns.append(part.subject[rows].tolist())
+        if len(part.placement):
+            columns.append(part.placement[rows].tolist())
         table.writerows(zip(*columns, strict=True))
     return text.getvalue()

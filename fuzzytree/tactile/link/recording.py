@@ -201,6 +201,11 @@ class Recording(contextlib.AbstractContextManager["Recording"]):
     cut_bytes: int
     started_ns: int
 
+    @property
+    def sensor(self) -> Sensor:
+        """That of the board."""
+        return self.board.sensor
+
     def __iter__(self) -> Iterator[FrameRecord]:
         """Give the frames, and how many they are so far."""
         times, numbers = self.times.tolist(), self.numbers.tolist()

@@ -10,8 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fuzzytree.tactile.rest import Rest
+
 if TYPE_CHECKING:
     import numpy.typing as npt
+
+    from fuzzytree.tactile.link.recording import FrameFile
+    from fuzzytree.tactile.sensor import Sensor
 
 LEAST_AREA = 2
 """The fewest cells of an object; what is smaller is counted and left out."""
@@ -192,3 +197,63 @@ def _distance(region: Region, track: _Track) -> float:
 def _reach(region: Region) -> float:
     top, left, bottom, right = region.box
     return 2.0 + max(bottom - top, right - left) / 2
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """A stream of frames as live recognition sees it: the object of largest force.
+
+    Attributes:
+        frames: What presses of that object, of shape (frames, rows, columns).
+        sensor: That fits them: no baseline, no threshold.
+        saturated: In how many frames a cell takes no more.
+        several: In how many frames there were other objects, which are left out.
+        placements: Shape (frames,): how often the sensor had been free before, plus 1.
+    """
+
+    frames: npt.NDArray[np.uint16]
+    sensor: Sensor
+    saturated: int
+    several: int
+    placements: npt.NDArray[np.int64]
+
+
+def followed(
+    file: FrameFile, sensor: Sensor | None = None, least: int = LEAST_AREA
+) -> Followed:
+    """Return the frames of a file as live recognition would see them.
+
+    Args:
+        file: A recording, an archive or a table.
+        sensor: What the cells read at rest at the beginning; as in the file if None.
+        least: The fewest cells of an object.
+
+    Raises:
+        ReadError: If the file cannot be read.
+    """
+    board = file.board
+    rest = Rest(sensor or board.sensor, board.start.follow_s, board.calibration)
+    stated = file.sensor
+    frames: list[npt.NDArray[np.uint16]] = []
+    placements: list[int] = []
+    saturated = several = count = 0
+    is_free = True
+    nothing = np.zeros((rest.bare.rows, rest.bare.columns), np.uint16)
+    for frame, _ in file:
+        if file.sensor is not stated:
+            stated = file.sensor
+            rest.restart(stated)
+        found, _ = regions(rest(frame.cells, frame.time), least)
+        saturated += rest.saturated(frame.cells) > 0
+        several += len(found) > 1
+        count += is_free and bool(found)
+        is_free = not found
+        frames.append(found[0].cells.astype(np.uint16) if found else nothing)
+        placements.append(count)
+    return Followed(
+        np.array(frames).reshape(-1, *nothing.shape),
+        rest.bare,
+        saturated,
+        several,
+        np.array(placements, np.int64),
+    )

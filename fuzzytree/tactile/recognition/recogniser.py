@@ -21,6 +21,9 @@ from fuzzytree.tactile.sensor import Cells, Sensor, saturated
 USUAL_FLOOR = 0.001
 """What is weaker lies beyond all that was learnt, unless one knows better."""
 
+FEW = 10
+"""Rows of a class below which a tree rejects nothing by itself."""
+
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
@@ -167,16 +170,30 @@ def usual_floor(model: Model) -> float:
     """Return the floor of strength below which one usually rejects.
 
     Far from all that a model has learnt every fitted set is 0, and the class that is
-    nearest means nothing. Relative rules have no such strength: their floor is 0.
+    nearest means nothing. Relative rules have no such strength: their floor is 0. So
+    is that of a tree that was taught a class with fewer than `FEW` rows: its sets end
+    where these few end, and rejected would be what it knows.
 
     Example:
         >>> from fuzzytree import learn, table
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
         >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
         >>> usual_floor(tree), usual_floor(rules_from_tree(tree))
-        (0.001, 0.0)
+        (0.0, 0.0)
+        >>> many = learn(table(np.tile(areas, (5, 1)), columns=["area"]),
+        ...     target=["s", "s", "l", "l"] * 5)
+        >>> usual_floor(many)
+        0.001
     """
-    return 0.0 if strength_rules(model).kind == "relative" else USUAL_FLOOR
+    if strength_rules(model).kind == "relative":
+        return 0.0
+    if isinstance(model, FuzzyTree):
+        taught = dict.fromkeys(model.classes, 0.0)
+        for leaf in model.leaves:
+            taught[leaf.label] += FEW if leaf.support is None else leaf.support
+        if any(0 < count < FEW for count in taught.values()):
+            return 0.0
+    return USUAL_FLOOR
 
 
 def strength_rules(model: Model) -> RuleBase:

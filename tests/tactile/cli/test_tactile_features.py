@@ -44,13 +44,13 @@ def test_frames_become_a_table_that_a_tree_is_learnt_from(
     assert capsys.readouterr().err == (
         "read     f.npz   4 frames of 6 x 6 cells\n"
         "left out 1 frame nothing presses\n"
-        "full     1 frame a cell reads 255 or more\n"
+        "full     1 frame a cell takes no more\n"
         "few      small   2 placements: below 10, `live` finds more of its presses "
         "unknown\n"
         "few      large   1 placement: below 10, `live` finds more of its presses "
         "unknown\n"
         "wrote    t.csv   2 features; next: fuzzytree learn t.csv --target class "
-        "-o tree.yaml --ignore subject\n"
+        "-o tree.yaml --groups subject\n"
     )
     words = ["learn", "t.csv", "--target", "class", "-o", "tree.yaml"]
     assert main([*words, "--ignore", "subject", "--no-test", "--quiet"]) == 0
@@ -101,9 +101,9 @@ def test_files_of_one_class_each_become_one_table(
     words = ["tactile", "features", "cup=cup.ftr", "a pen=pen.ftr", "cup=cup.ftr"]
     assert main([*words, "--features", "S1,force", "-o", "t.csv"]) == 0
     assert Path("t.csv").read_text().splitlines()[1:] == [
-        "0.7058823529411765,1.411764705882353,cup",
-        "0.6352941176470588,1.2705882352941176,a pen",
-        "0.7058823529411765,1.411764705882353,cup",
+        "0.7058823529411765,1.411764705882353,cup,1",
+        "0.7058823529411765,1.411764705882353,a pen,2",  # 9 less everywhere: a shift
+        "0.7058823529411765,1.411764705882353,cup,3",
     ]
     few = "below 10, `live` finds more of its presses unknown"
     lines = capsys.readouterr().err.splitlines()
@@ -135,3 +135,28 @@ def test_a_pipe_is_refused_and_not_waited_for(
     os.mkfifo("pipe")
     assert main(["tactile", "features", "pipe"]) == 2
     assert capsys.readouterr().err == "pipe: is a pipe, and no file\n"
+
+
+def test_a_recording_is_seen_as_live_sees_it(
+    frames: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    board = Board("mat", Sensor(8, 8, threshold=4), Marker("AA 55"))
+    cells = np.zeros((90, 8, 8), np.int64)
+    for placement in range(3):
+        cells[30 * placement + 5 : 30 * placement + 25, 2:5, 2:5] = 80
+    cells[40:50, 6:8, 6:8] = 50  # something else lies beside it
+    cells[30:] += 9  # all cells have moved
+    with Recorder("bar.ftr", board) as recorder:
+        for number, frame in enumerate(cells):
+            recorder.write(Frame(frame, number / 44, number), Counters())
+    words = ["tactile", "features", "bar=bar.ftr", "--features", "area,force"]
+    assert main([*words, "-o", "t.csv"]) == 0
+    rows = Path("t.csv").read_text("utf-8").splitlines()
+    assert rows[0] == "area,force,class,placement"
+    force = 9 * 80 / 255
+    assert rows[1:] == [f"9.0,{force},bar,{n // 20 + 1}" for n in range(60)]
+    said = capsys.readouterr().err
+    assert "left out 30 frames   nothing presses" in said
+    assert "several  10 frames   several objects: the one of the largest" in said
+    assert "few      bar         3 placements" in said
+    assert "learn t.csv --target class -o tree.yaml --groups placement" in said
