@@ -167,9 +167,11 @@ def test_what_is_far_from_all_that_was_learnt_is_unknown_unless_one_requests(
     call: Call,
 ) -> None:
     words = ("simulator", "--model", "area.yaml", "--speed", "0", "--frames", "60")
-    _, out, err = call(*words)
+    _, out, err = call(*words, "--reject", "0.001")
     assert {row.split("\t")[2] for row in out.splitlines()} == {"unknown"}
     assert "no rule, or one below 0.001, decides; --reject sets it\n" in err
+    _, out, _ = call(*words)  # a class of two rows is too few to reject by
+    assert {row.split("\t")[2] for row in out.splitlines()} == {"object"}
     tree = ft.load("area.yaml")
     assert isinstance(tree, ft.FuzzyTree)
     ft.save(ft.rules_from_tree(tree), "relative.yaml")
