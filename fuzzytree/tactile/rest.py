@@ -27,6 +27,9 @@ HOT_S = 1.0
 LARGEST_SHIFT = 0.1
 """The largest share of full by which all cells may have moved together."""
 
+TARE_FRAMES = 10
+"""How many frames a tare takes."""
+
 _RELEASED = 3  # frames below the baseline, one after another, before it goes down
 _DEAD = 3  # placements around a cell that does not press
 _LONGEST_S = 1.0  # between two frames: a longer pause counts as this
@@ -40,15 +43,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RestEvent:
-    """A change in what cells read at rest.
+    """A change in what cells read at rest, or in what can be told apart.
 
     Attributes:
-        kind: `tare`, or `hot` or `dead` cells that were found.
+        kind: `tare`; `interrupted`: a tare that begins anew, for the port went away;
+            `hot` or `dead` cells that were found; or `merged` objects that touch now.
         cells: The (row, column) of each cell that is masked from now on.
+        objects: The numbers of objects that are one region now.
     """
 
-    kind: Literal["tare", "hot", "dead"]
+    kind: Literal["tare", "interrupted", "hot", "dead", "merged"]
     cells: tuple[tuple[int, int], ...] = ()
+    objects: tuple[int, ...] = ()
 
 
 class Rest:
@@ -130,9 +136,20 @@ class Rest:
             masked=_places(self._is_masked),
         )
 
-    def tare(self, frames: int = 10) -> None:
+    @property
+    def tare_text(self) -> str:
+        """How far a tare is that is going on."""
+        return f"{len(self._tared)} of {self._tare_frames} frames came"
+
+    def tare(self, frames: int = TARE_FRAMES) -> None:
         """Let the next frames, 1 or more, be the baseline: their median."""
         self._tared, self._tare_frames = [], frames
+
+    def interrupt(self) -> None:
+        """Begin a tare anew that is going on: frames before a pause do not count."""
+        if self._tare_frames:
+            self._tared = []
+            self._events.append(RestEvent("interrupted"))
 
     def restart(self, sensor: Sensor) -> None:
         """Take the baseline and the masked cells of a sensor, as after a tare."""

@@ -231,6 +231,8 @@ def _report(
     found = [f"{visible(label)} {count}" for label, count in sorted(labels.items())]
     unknown = labels[word]
     floor = f"no rule, or one below {reject:g}, decides; --reject sets it"
+    if options.vote:
+        floor = f"{floor}; or the vote was not over"
     small = f"regions below {options.area} cells, no objects; --area sets it"
     say_rows(
         ("answered", f"{frames} frames", ", ".join(found)),
@@ -240,3 +242,5 @@ def _report(
         *([("took", timing(view), "")] if view.latency else []),
         quiet=options.quiet,
     )
+    if live.rest.is_taring:
+        say(f"the tare did not end: {live.rest.tare_text}")

@@ -386,6 +386,8 @@ class Live:
         trouble = f"{some} no more: the frame is saturated" if count else ""
         late = self.source.now() - frame.time
         events = tuple(self.rest.news())
+        if self._tracker.merged:
+            events += (RestEvent("merged", objects=self._tracker.merged),)
         bare = self.rest.bare
         return LiveResult(
             frame, cells, bare, objects, left_out, count, late, trouble, events
@@ -427,6 +429,8 @@ class Live:
         self._first = self._first if self._number else time
         self._largest = max(self._largest, latency)
         counted = _failures(self.source.counters)
+        if counted[-1] != self._counted[-1]:  # the port went away
+            self.rest.interrupt()
         if counted != self._counted:
             self._past = _sentence(self._counted, counted), time
             self._counted = counted

@@ -119,6 +119,10 @@ class Tracker:
     Args:
         seconds: How long votes count; 0 for the answer to each frame.
 
+    Attributes:
+        merged: The numbers of objects of the frame before that are one region in the
+            last one; empty as a rule.
+
     Example:
         >>> tracker, (one,) = Tracker(1.0), regions(np.ones((2, 2), np.int64))[0]
         >>> votes = [(0.0, 5), (0.5, 5), (1.0, 5), (1.2, 3), (1.4, 5)]
@@ -130,6 +134,8 @@ class Tracker:
         self._seconds = seconds
         self._tracks: list[_Track] = []
         self._last = 0
+        self._seen: set[int] = set()  # in the frame before
+        self.merged: tuple[int, ...] = ()
 
     def __call__(
         self, time: float, found: Sequence[Region], codes: Sequence[int]
@@ -165,8 +171,26 @@ class Tracker:
             track.row, track.column = _middle(region)
             track.seen = time
             answers.append((track.number, self._voted(track, time, code)))
+        self._note_merged(found, known, [number for number, _ in answers])
         self._tracks = known
         return answers
+
+    def _note_merged(
+        self, found: Sequence[Region], known: Sequence[_Track], numbers: list[int]
+    ) -> None:
+        """Note objects of the frame before that lie in the region of another one."""
+        self.merged = ()
+        for region, number in zip(found, numbers, strict=True):
+            inside = [
+                one.number
+                for one in known
+                if one.number in self._seen
+                and one.number not in numbers
+                and region.cells[round(one.row), round(one.column)] > 0
+            ]
+            if inside:
+                self.merged = (*sorted({number, *inside}),)
+        self._seen = set(numbers)
 
     def _voted(self, track: _Track, time: float, code: int) -> int | None:
         if not self._seconds:

@@ -70,7 +70,8 @@ class TactileSensor(contextlib.AbstractContextManager["TactileSensor"]):
         What changes in what the cells read at rest goes to the recording.
         """
         for answer in self.live.answers(most):
-            if answer.events and self.recorded is not None:
+            is_new = any(one.kind in ("tare", "hot", "dead") for one in answer.events)
+            if is_new and self.recorded is not None:
                 self.recorded.rest(self.sensor, answer.frame)
             yield answer
 

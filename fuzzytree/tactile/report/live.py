@@ -201,6 +201,11 @@ def event_text(event: RestEvent) -> str:
     """Return in words what has changed in what cells read at rest."""
     if event.kind == "tare":
         return "tared: what the cells read now is their baseline"
+    if event.kind == "interrupted":
+        return "the port went away during the tare, which begins anew"
+    if event.kind == "merged":
+        names = " and ".join(map(str, event.objects))
+        return f"the objects {names} touch: they are one region, and one object"
     what = "pressed alone all the time" if event.kind == "hot" else "never pressed"
     return f"{event.kind} cells, masked: {named(event.cells)} ({what})"
 

@@ -17,6 +17,8 @@ from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.objects import Tracker, regions
 from fuzzytree.tactile.recognition.recogniser import State
+from fuzzytree.tactile.report.live import event_text
+from fuzzytree.tactile.rest import RestEvent
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import press
@@ -154,3 +156,40 @@ def test_a_vote_is_unknown_before_its_time() -> None:
     live = Live(tree, Sensor(12, 12), Paced(records, 0.0), "one", vote_s=0.5)
     answers = list(live.answers(9))
     assert [one.label for one in answers] == [""] * 5 + ["s"] * 4
+
+
+def test_objects_that_touch_are_reported_once() -> None:
+    areas = np.array([[4.0], [5.0], [16.0], [15.0]])
+    tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
+    shown = [squares((1, 1), (1, 6 - step), size=3) for step in range(3)]
+    shown += [shown[-1]] * 3
+    records = (
+        FrameRecord(Frame(cells, 0.1 * k, k), Counters(frames=k + 1))
+        for k, cells in enumerate(shown)
+    )
+    answers = list(Live(tree, Sensor(12, 12), Paced(records, 0.0), "two").answers())
+    assert [len(one.objects) for one in answers] == [2, 2, 1, 1, 1, 1]
+    events = [(k, event) for k, one in enumerate(answers) for event in one.events]
+    assert events == [(2, RestEvent("merged", objects=(1, 2)))]
+    assert event_text(events[0][1]) == (
+        "the objects 1 and 2 touch: they are one region, and one object"
+    )
+
+
+def test_a_tare_that_a_pulled_plug_interrupts_begins_anew() -> None:
+    areas = np.array([[4.0], [5.0], [16.0], [15.0]])
+    tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
+    records = (
+        FrameRecord(
+            Frame(squares((1, 1)) * (k >= 5), 0.1 * k, k),
+            Counters(frames=k + 1, reconnects=int(k >= 5)),
+        )
+        for k in range(22)
+    )
+    live = Live(tree, Sensor(12, 12), Paced(records, 0.0), "one")
+    live.tare()
+    answers = list(live.answers())
+    events = [(k, event.kind) for k, one in enumerate(answers) for event in one.events]
+    assert events == [(6, "interrupted"), (15, "tare")]
+    assert answers[10].objects
+    assert not answers[-1].objects  # what lay there after the pause is the baseline
