@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import fuzzytree as ft
+from fuzzytree.cli.program import main
 from fuzzytree.errors import InvalidModelError, ReadError, TableError
 from fuzzytree.model import FloatArray
-from fuzzytree.tactile.board_file import board_text, read_board
+from fuzzytree.tactile.board_file import board_text, load_board, read_board
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.calibration import (
     STEPS,
@@ -16,7 +19,7 @@ from fuzzytree.tactile.calibration import (
     fit_forces,
     fit_pressures,
 )
-from fuzzytree.tactile.link.recording import FrameRecord
+from fuzzytree.tactile.link.recording import FrameRecord, Recorder
 from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.rest import Rest
@@ -81,7 +84,11 @@ def test_pressed_cells_stay_pressed_and_full_is_the_last_step() -> None:
 
 def test_the_unit_reaches_frames_features_and_answers() -> None:
     values = np.array([[30.0], [40.0], [200.0], [220.0]])
-    tree = ft.learn(ft.table(values, columns=["force"]), target=["a", "a", "b", "b"])
+    tree = ft.learn(
+        ft.table(values, columns=["force"]),
+        target=["a", "a", "b", "b"],
+        units={"force": "kPa"},
+    )
     cells = np.zeros((6, 6), np.int64)
     cells[2:4, 2:4] = 200
     record = FrameRecord(Frame(cells, 0.0, 0), Counters(frames=1))
@@ -142,3 +149,52 @@ def test_loads_that_give_no_curve_are_refused(
     with pytest.raises(TableError) as caught:
         fit_pressures(loads, readings, "kPa")
     assert str(caught.value) == text
+
+
+def test_a_model_of_another_unit_is_refused() -> None:
+    values = np.array([[30.0], [40.0], [200.0], [220.0]])
+    rows = ft.table(values, columns=["force"])
+    tree = ft.learn(rows, target=["a", "a", "b", "b"], name="m", units={"force": "N"})
+    for law, unit in ((LAW, "kPa"), (None, "shares of full")):
+        with pytest.raises(TableError) as caught:
+            Live(tree, Sensor(6, 6), Paced([], 0.0), "x", calibration=law)
+        text = f"m: 'force' is in N, and the frames are in {unit}"
+        assert str(caught.value) == text
+
+
+def test_calibrate_writes_a_board_that_live_features_and_learn_understand(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    board = Board("mat", Sensor(*SHAPE, threshold=3), Marker("AA 55"))
+    Path("mat.yaml").write_text(board_text(board), "utf-8")
+    for load in (10, 20, 40):
+        cells = felt(float(load), np.ones(SHAPE)).astype(np.int64)
+        with Recorder(f"{load}.ftr", board) as recorder:
+            for number in range(30):
+                shown = cells * (number >= 5)
+                recorder.write(Frame(shown, number / 44, number), Counters())
+    words = ["tactile", "calibrate", "mat.yaml", "10=10.ftr", "20=20.ftr", "40=40.ftr"]
+    assert main([*words, "-o", "kpa.yaml"]) == 0
+    law = load_board("kpa.yaml").calibration
+    assert law is not None
+    assert [point[1] for point in law.points] == [10.0, 20.0, 40.0]
+    said = capsys.readouterr().err
+    assert "gains    1 to 1" in said
+    assert "full is " in said
+
+    other = Board("pad", Sensor(2, 2), Marker("AA 55"))
+    with Recorder("other.ftr", other) as recorder:
+        recorder.write(Frame(np.ones((2, 2), np.int64), 0.0, 0), Counters())
+    with Recorder("empty.ftr", board):
+        pass
+    wrong = {
+        "5=other.ftr": "other.ftr: is a recording of another board, pad",
+        "5=empty.ftr": "empty.ftr: holds no frame, so the load has nothing to show",
+        "5=none.ftr": "none.ftr: cannot be read: no such file or directory",
+        "five=10.ftr": "'five=10.ftr': write LOAD=FILE, such as 10=ten.ftr",
+    }
+    for text, sentence in wrong.items():
+        assert main(["tactile", "calibrate", "mat.yaml", text, "-o", "no.yaml"]) == 2
+        assert capsys.readouterr().err.splitlines()[0] == sentence
+        assert not Path("no.yaml").exists()

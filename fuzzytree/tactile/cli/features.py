@@ -156,6 +156,7 @@ def _table(
     counted_frames: Counter[str],
 ) -> int:
     from fuzzytree.report import counted
+    from fuzzytree.tactile.features.names import feature_of, has_unit
     from fuzzytree.tactile.runtimes.frames import features_of
 
     names = [*costs]
@@ -191,6 +192,9 @@ def _table(
         after += ["--groups", "subject"]
     elif len(presses.placement):
         after += ["--groups", PLACEMENT]
+    if sensor.unit:
+        for name in filter(lambda one: has_unit(feature_of(one)), names):
+            after += ["--unit", f"{name}={sensor.unit}"]
     text = f"next: {shlex.join(after)}" if len(presses.label) else "without classes"
     rows.append(("wrote", output, f"{counted(len(names), 'feature')}; {text}"))
     say_rows(*rows, quiet=options.quiet)

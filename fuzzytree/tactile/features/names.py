@@ -111,6 +111,17 @@ class Feature(Value, frozen=True):
     per_force: bool = False
 
 
+def has_unit(feature: Feature) -> bool:
+    """Return whether a feature is a pressure, or a sum of pressures.
+
+    Example:
+        >>> [has_unit(feature_of(name)) for name in ("force", "log force", "S1")]
+        [True, False, False]
+    """
+    is_pressure = feature.kind != "moment" or feature.base in ("force", "peak")
+    return is_pressure and not (feature.is_log or feature.per_force)
+
+
 def blocks(rows: int, columns: int) -> tuple[str, ...]:
     """Return the names of all blocks of a division.
 

@@ -19,7 +19,7 @@ from fuzzytree.tactile.recognition.objects import (
     regions,
 )
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State
-from fuzzytree.tactile.rest import FOLLOW_S, Rest, RestEvent
+from fuzzytree.tactile.rest import FOLLOW_S, HOT_S, Rest, RestEvent
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
 if TYPE_CHECKING:
@@ -301,7 +301,9 @@ class Live:
     ) -> None:
         self.source, self.name = source, name
         self._sensor, self._stated = sensor, source.sensor
-        self.rest = Rest(sensor, follow_s, calibration)
+        # A single cell may be an object where that is wanted: it is hot much later.
+        hot_s = HOT_S if least > 1 else 60 * HOT_S
+        self.rest = Rest(sensor, follow_s, calibration, hot_s=hot_s)
         self.recogniser = Recogniser(model, self.rest.bare, reject)
         self._least, self._tracker = least, Tracker(vote_s)
         self._tare_wanted = threading.Event()

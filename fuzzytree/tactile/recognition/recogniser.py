@@ -12,7 +12,7 @@ from fuzzytree.errors import TableError
 from fuzzytree.model import FloatArray, FuzzyTree, IntArray, Model, RuleBase, Run
 from fuzzytree.runtimes import class_probabilities, load
 from fuzzytree.semantics import Status, rules_from_tree
-from fuzzytree.tactile.features.names import feature_of
+from fuzzytree.tactile.features.names import feature_of, has_unit
 from fuzzytree.tactile.features.plain import State as State
 from fuzzytree.tactile.features.plain import check_reject
 from fuzzytree.tactile.runtimes.frames import Features, FramePlan
@@ -69,7 +69,8 @@ class Recogniser:
         reject: The floor of the strength, 0 to 1; 0 rejects only what no rule covers.
 
     Raises:
-        TableError: If an input of the model is no feature of a frame.
+        TableError: If an input of the model is no feature of a frame, or one of
+            pressure is in another unit than the sensor's.
         InvalidModelError: If a feature is beyond the sensor.
         ValueError: If `reject` is no number in 0 to 1, or if the rules are relative:
             one of them always has the strength 1.
@@ -87,6 +88,7 @@ class Recogniser:
 
     def __init__(self, model: Model, sensor: Sensor, reject: float = 0.0) -> None:
         check_inputs(model)
+        check_units(model, sensor)
         rules = strength_rules(model)
         check_reject(rules, reject)
         self.model, self.sensor, self.reject = model, sensor, reject
@@ -215,6 +217,21 @@ def check_inputs(model: Model) -> None:
             feature_of(name)
         except TableError as error:
             raise TableError(f"{model.name} uses other features: {error}") from error
+
+
+def check_units(model: Model, sensor: Sensor) -> None:
+    """Refuse a model with an input of pressure in another unit than a sensor's.
+
+    Raises:
+        TableError: If there is one; it names the model.
+    """
+    for variable in model.variables:
+        if variable.name not in model.inputs or variable.unit == sensor.unit:
+            continue
+        if has_unit(feature_of(variable.name)):
+            own, other = (u or "shares of full" for u in (variable.unit, sensor.unit))
+            text = f"{variable.name!r} is in {own}, and the frames are in {other}"
+            raise TableError(f"{model.name}: {text}")
 
 
 def checked_model(model: object, name: str) -> Model:
