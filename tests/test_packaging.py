@@ -82,7 +82,7 @@ def test_the_version_of_the_package_is_that_of_the_changelog() -> None:
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("how", ["editable", "wheel", "wheel from sdist"])
+@pytest.mark.parametrize("how", ["editable", "wheel from sdist"])
 def test_an_installation_without_extras_learns_and_names_a_missing_one(
     how: str, tmp_path: Path
 ) -> None:

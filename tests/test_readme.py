@@ -12,7 +12,6 @@ import io
 import os
 import re
 import runpy
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -49,25 +48,6 @@ def test_the_first_two_commands_are_the_ones_that_ci_runs() -> None:
     script = (ROOT / ".ci" / "run").read_text("utf-8")
     assert 'bash -c "$main"' in script
     assert 'bash -c "$tests"' in script
-
-
-@pytest.mark.heavy
-def test_the_first_command_works_in_a_fresh_copy(tmp_path: Path) -> None:
-    first = next(text for kind, text in _blocks() if kind == "sh")
-    copy = tmp_path / "fuzzytree"
-    ignored = shutil.ignore_patterns(
-        ".git", ".venv", "__pycache__", ".*_cache", ".hypothesis", "*.egg-info",
-        "build", "dist", "out",
-    )  # fmt: skip
-    shutil.copytree(ROOT, copy, symlinks=True, ignore=ignored)
-    done = subprocess.run(
-        ["bash", "-c", first],
-        cwd=copy, capture_output=True, text=True, timeout=900, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert (copy / "out" / "wine-rules.yaml").is_file()
-    assert (copy / "out" / "wine-rules.onnx").is_file()
-    assert "IF " in done.stdout
 
 
 @pytest.mark.heavy

@@ -180,7 +180,7 @@ def system_gaps(system: FuzzySystem, rows: Sequence[Row]) -> tuple[int, int]:
 
 @pytest.mark.parametrize(
     ("kind", "fewest"),
-    [("samples", 500), pytest.param("random", 100, marks=pytest.mark.heavy)],
+    [("samples", 500), pytest.param("random", 50, marks=pytest.mark.heavy)],
 )
 def test_our_evaluator_has_the_numbers_of_systems_within_derived_bounds(
     library: Need, kind: str, fewest: int

@@ -77,7 +77,7 @@ def test_all_criteria_hold_for_generated_trees(seed: int) -> None:
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("seed", range(2, 4))
+@pytest.mark.parametrize("seed", [2])
 def test_all_criteria_hold_in_every_runtime_for_generated_trees(seed: int) -> None:
     semantics = Semantics("product" if seed % 2 else "minimum")
     tree = random_tree(seed, leaves=3 + seed, combinations=0.5, semantics=semantics)
