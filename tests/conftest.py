@@ -42,9 +42,33 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.freeze()
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a run be bounded: `--every 2` runs every second case of large heavy tests."""
+    text = "run one case in so many of heavy tests with 6 cases or more"
+    parser.addoption("--every", type=int, default=1, help=text)
+
+
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(
+    config: pytest.Config, items: list[pytest.Item]
+) -> None:
     """Leave one case in so many of a test with the mark `one_in`; others are heavy."""
+    _mark_heavy(items)
+    step = config.getoption("--every")
+    heavy = [item for item in items if item.get_closest_marker("heavy") is not None]
+    sizes = Counter(item.nodeid.partition("[")[0] for item in heavy)
+    seen: Counter[str] = Counter()
+    for item in heavy if step > 1 else ():
+        name = item.nodeid.partition("[")[0]
+        if sizes[name] >= _MANY_CASES and seen[name] % step:
+            items.remove(item)
+        seen[name] += 1
+
+
+_MANY_CASES = 6
+
+
+def _mark_heavy(items: list[pytest.Item]) -> None:
     cases: Counter[str] = Counter()
     for item in items:
         mark = item.get_closest_marker("one_in")

@@ -160,7 +160,7 @@ ENGINES = ("dask", "duckdb", "ibis", "polars", "spark")
 def test_the_python_of_a_page_runs(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if page.stem in ("add-a-format", "frames", *ENGINES):
+    if page.stem in ("add-a-format", "frames", "tactile", *ENGINES):
         pytest.skip("a test of its own follows the page")
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     (tmp_path / "out").mkdir()

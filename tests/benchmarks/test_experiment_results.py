@@ -27,7 +27,6 @@ def is_within(study: Study, stated: float) -> bool:
 @pytest.mark.parametrize(
     ("name", "features", "settings", "stated", "floor"),
     [
-        ("postures", "log orientation", LearningSettings(), 0.787, 0.7),
         ("touch", None, None, 0.859, 0.8),
     ],
 )

@@ -543,7 +543,9 @@ def test_a_hostile_file_ends_in_a_short_error_soon(content: bytes) -> None:
     start = time.process_time()
     with pytest.raises(ReadError) as caught:
         read_fcl(content, "file.fcl")
-    assert time.process_time() - start < 4.0
+    assert (
+        time.process_time() - start < 8.0
+    )  # on a slow machine, and it would be minutes if it grew with the square
     assert len(str(caught.value)) < 40_000
 
 

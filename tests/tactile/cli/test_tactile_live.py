@@ -447,7 +447,7 @@ def test_lines_come_at_once_while_live_goes_on(call: Call, tmp_path: Path) -> No
         run.send_signal(signal.SIGINT)
         assert run.wait(30) == 0
         timer.cancel()
-    assert line.count(b"\t") == 5
+    assert line.count(b"\t") == 12
 
 
 @pytest.mark.heavy
