@@ -102,11 +102,12 @@ class Screen:
         """Take keys as they are pressed, without showing them."""
         if sys.platform == "win32" or not sys.stdin.isatty():
             return
-        self._keyboard = sys.stdin.fileno()
-        self._settings = termios.tcgetattr(self._keyboard)
-        new = termios.tcgetattr(self._keyboard)
+        keyboard = sys.stdin.fileno()
+        self._settings = termios.tcgetattr(keyboard)
+        new = termios.tcgetattr(keyboard)
         new[3] &= ~(termios.ICANON | termios.ECHO)
-        termios.tcsetattr(self._keyboard, termios.TCSANOW, new)
+        termios.tcsetattr(keyboard, termios.TCSANOW, new)
+        self._keyboard = keyboard
 
     def _listen_no_more(self) -> None:
         if sys.platform != "win32" and self._keyboard is not None:

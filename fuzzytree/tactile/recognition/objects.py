@@ -6,7 +6,7 @@ import math
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -68,7 +68,8 @@ def regions(
     """
     from scipy import ndimage
 
-    numbers, count = ndimage.label(pressed, _TOUCHING)
+    labelled: Any = ndimage.label(pressed, _TOUCHING)  # scipy states a union
+    numbers, count = labelled
     if not count:
         return [], 0
     areas = np.bincount(numbers.reshape(-1), minlength=count + 1)

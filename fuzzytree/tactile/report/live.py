@@ -367,7 +367,7 @@ def line_facts(answer: LiveResult) -> list[dict[str, object]]:
     ]
 
 
-_PLACE = ("x", "y", "angle", "area", "force", "box")
+_PLACE: tuple[str, ...] = ("x", "y", "angle", "area", "force", "box")
 
 
 def lines(answer: LiveResult) -> str:
