@@ -345,9 +345,10 @@ def line_facts(answer: LiveResult) -> list[dict[str, object]]:
         "frame": answer.frame.number,
     }
     if not answer.objects:
-        rest: dict[str, object] = dict.fromkeys(_PLACE)
-        facts = {"state": state, "class": None, "strength": 0.0}
-        return [begin | facts | {"saturated": answer.saturated, "object": None} | rest]
+        begin |= {"state": state, "class": None, "strength": 0.0}
+        begin |= {"saturated": answer.saturated, "object": None}
+        begin.update(dict.fromkeys(_PLACE))
+        return [begin]
     return [
         begin
         | {
