@@ -306,6 +306,7 @@ class Live:
         self.rest = Rest(sensor, follow_s, calibration, hot_s=hot_s)
         self.recogniser = Recogniser(model, self.rest.bare, reject)
         self._least, self._tracker = least, Tracker(vote_s)
+        regions(np.zeros((sensor.rows, sensor.columns), np.int64))  # loads scipy now
         self._tare_wanted = threading.Event()
         self._news = threading.Condition()
         self._answer: LiveResult | None = None
