@@ -56,6 +56,25 @@ class RestEvent:
     cells: tuple[tuple[int, int], ...] = ()
     objects: tuple[int, ...] = ()
 
+    @property
+    def text(self) -> str:
+        """The change in words."""
+        from fuzzytree.tactile.link.starting import named
+
+        match self.kind:
+            case "tare":
+                return "tared: what the cells read now is their baseline"
+            case "interrupted":
+                return "the port went away during the tare, which begins anew"
+            case "merged":
+                names = " and ".join(map(str, self.objects))
+                return f"the objects {names} touch: they are one region, and one object"
+            case "hot":
+                why = "pressed alone all the time"
+            case "dead":
+                why = "never pressed"
+        return f"{self.kind} cells, masked: {named(self.cells)} ({why})"
+
 
 class Rest:
     """What each cell reads at rest; called with each frame, it gives what presses.

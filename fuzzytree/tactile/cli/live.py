@@ -172,7 +172,7 @@ def _display(
     """Show a picture on a terminal; elsewhere yield what writes new, stable results."""
     from fuzzytree.tactile.cli.screen import Screen, ended_by_signals, look_of
     from fuzzytree.tactile.recognition.live import Hold
-    from fuzzytree.tactile.report.live import event_text, line_facts, lines, visible
+    from fuzzytree.tactile.report.live import line_facts, lines, visible
 
     hold, said = Hold(options.hold), [""]
 
@@ -182,7 +182,7 @@ def _display(
             said.append(trouble)
             say(visible(trouble))
         for event in answer.events:
-            say(event_text(event), quiet=options.quiet)
+            say(event.text, quiet=options.quiet)
         shown = tuple(sorted((one.number, one.code) for one in answer.objects))
         if answer.state is None or not hold(shown):
             return

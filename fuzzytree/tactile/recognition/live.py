@@ -437,6 +437,8 @@ class Live:
         if counted != self._counted:
             self._past = _sentence(self._counted, counted), time
             self._counted = counted
+        if answer.events:
+            self._past = "; ".join(event.text for event in answer.events), time
         with self._news:
             self._answer = answer
             self._number += 1

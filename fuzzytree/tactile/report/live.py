@@ -12,7 +12,6 @@ from rich.cells import cell_len, set_cell_size
 
 from fuzzytree.model import printable
 from fuzzytree.tactile.interpolation import interpolated
-from fuzzytree.tactile.link.starting import named
 from fuzzytree.tactile.recognition.live import (
     SENTENCES,
     STATES,
@@ -20,7 +19,6 @@ from fuzzytree.tactile.recognition.live import (
     LiveView,
     SensorObject,
 )
-from fuzzytree.tactile.rest import RestEvent
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -195,19 +193,6 @@ def whereabouts(found: SensorObject) -> str:
     unit = found.recogniser.sensor.unit
     force = f"; force {found.force:.3g} {unit}" if unit else ""
     return f"centre {found.x:+.1f}, {found.y:+.1f}; {found.region.area} cells{force}"
-
-
-def event_text(event: RestEvent) -> str:
-    """Return in words what has changed in what cells read at rest."""
-    if event.kind == "tare":
-        return "tared: what the cells read now is their baseline"
-    if event.kind == "interrupted":
-        return "the port went away during the tare, which begins anew"
-    if event.kind == "merged":
-        names = " and ".join(map(str, event.objects))
-        return f"the objects {names} touch: they are one region, and one object"
-    what = "pressed alone all the time" if event.kind == "hot" else "never pressed"
-    return f"{event.kind} cells, masked: {named(event.cells)} ({what})"
 
 
 def counts(view: LiveView) -> str:

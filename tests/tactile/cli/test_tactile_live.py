@@ -346,6 +346,23 @@ FOREVER = ("simulator", "--model", "area.yaml")
 
 
 @pytest.mark.heavy
+def test_keys_tare_and_change_the_picture(call: Call, tmp_path: Path) -> None:
+    number, terminal = started(tmp_path, *FOREVER, COLORTERM="truecolor")
+    assert b"3 points a cell" in until(terminal, b"3 points a cell")
+    for key, shown in (
+        (b"i", b"5 points"),
+        (b"s", b"the real cells"),
+        (b"t", b"tared"),
+    ):
+        os.write(terminal, key)
+        assert shown in until(terminal, shown)
+    os.kill(number, signal.SIGINT)
+    code, last = ended(number, terminal)
+    assert code == 0
+    assert LEAVES in last
+
+
+@pytest.mark.heavy
 def test_ctrl_c_gives_the_terminal_back_and_is_a_normal_end(
     call: Call, tmp_path: Path
 ) -> None:

@@ -17,7 +17,6 @@ from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.objects import Tracker, regions
 from fuzzytree.tactile.recognition.recogniser import State
-from fuzzytree.tactile.report.live import event_text
 from fuzzytree.tactile.rest import RestEvent
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.objects import OBJECTS
@@ -171,7 +170,7 @@ def test_objects_that_touch_are_reported_once() -> None:
     assert [len(one.objects) for one in answers] == [2, 2, 1, 1, 1, 1]
     events = [(k, event) for k, one in enumerate(answers) for event in one.events]
     assert events == [(2, RestEvent("merged", objects=(1, 2)))]
-    assert event_text(events[0][1]) == (
+    assert events[0][1].text == (
         "the objects 1 and 2 touch: they are one region, and one object"
     )
 

@@ -24,7 +24,6 @@ from fuzzytree.tactile.report.live import (
     Look,
     counts,
     escaped,
-    event_text,
     line_facts,
     lines,
     picture,
@@ -211,10 +210,10 @@ def test_two_objects_are_two_lines_and_stand_in_the_headline() -> None:
 
 
 def test_changes_of_what_cells_read_at_rest_are_sentences() -> None:
-    assert event_text(RestEvent("tare")) == (
+    assert RestEvent("tare").text == (
         "tared: what the cells read now is their baseline"
     )
-    assert event_text(RestEvent("hot", ((2, 5),))) == (
+    assert RestEvent("hot", ((2, 5),)).text == (
         "hot cells, masked: r2 c5 (pressed alone all the time)"
     )
 
