@@ -42,9 +42,12 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.freeze()
 
 
+_MANY_CASES = 6
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let a run be bounded: `--every 2` runs every second case of large heavy tests."""
-    text = "run one case in so many of heavy tests with 6 cases or more"
+    text = f"run one case in so many of heavy tests with {_MANY_CASES} cases or more"
     parser.addoption("--every", type=int, default=1, help=text)
 
 
@@ -52,7 +55,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_collection_modifyitems(
     config: pytest.Config, items: list[pytest.Item]
 ) -> None:
-    """Leave one case in so many of a test with the mark `one_in`; others are heavy."""
+    """Mark cases as heavy, and leave some of the heavy ones out with `--every`."""
     _mark_heavy(items)
     step = config.getoption("--every")
     heavy = [item for item in items if item.get_closest_marker("heavy") is not None]
@@ -65,10 +68,8 @@ def pytest_collection_modifyitems(
         seen[name] += 1
 
 
-_MANY_CASES = 6
-
-
 def _mark_heavy(items: list[pytest.Item]) -> None:
+    """Leave one case in so many of a test with the mark `one_in`; others are heavy."""
     cases: Counter[str] = Counter()
     for item in items:
         mark = item.get_closest_marker("one_in")

@@ -53,10 +53,10 @@ if TYPE_CHECKING:
 
 State = TypeVar("State", "Learner", "LeafCounts")
 Lines = list[tuple[str, str, str]]
+Progress = Callable[[str, float], None]
 
 FEW_GROUPS = 10
 """Groups of a class below which its accuracy says little."""
-Progress = Callable[[str, float], None]
 
 
 class LearnOptions(RepresentationOptions):

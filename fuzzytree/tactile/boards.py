@@ -11,6 +11,7 @@ from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats import FileRecord
 from fuzzytree.model import Mistake, Value
 from fuzzytree.tactile.calibration import Calibration
+from fuzzytree.tactile.rest import FOLLOW_S
 from fuzzytree.tactile.sensor import Sensor, limit_mistakes
 
 HEXADECIMAL: Final = "[0-9A-Fa-f]{2}( ?[0-9A-Fa-f]{2}){0,63}"
@@ -178,7 +179,7 @@ class Start(Value, FileRecord, frozen=True):
     frames: StartFrames = 30
     hot: Share = 0.5
     follow_s: Annotated[float, Meta(ge=0.0, le=86400.0)] = field(
-        name="follow", default=30.0
+        name="follow", default=FOLLOW_S
     )
 
 

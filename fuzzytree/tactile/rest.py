@@ -9,14 +9,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-import msgspec
 import numpy as np
 
 from fuzzytree.tactile.calibration import STEPS, Calibration
-from fuzzytree.tactile.sensor import Cells, Sensor, check_frames, is_masked
+from fuzzytree.tactile.sensor import (
+    Cells,
+    Sensor,
+    at_rest,
+    baseline_of,
+    check_frames,
+    is_masked,
+    places,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+
+    _Followed = tuple[Cells, npt.NDArray[np.float64], npt.NDArray[np.bool_], float]
+    # the cells, their values, which press, seconds since the frame before
 
 FOLLOW_S = 30.0
 """Seconds in which the baseline of a free cell follows 63 % of a change."""
@@ -35,15 +45,9 @@ _DEAD = 3  # placements around a cell that does not press
 _LONGEST_S = 1.0  # between two frames: a longer pause counts as this
 
 
-if TYPE_CHECKING:
-    _Followed = tuple[
-        Cells, npt.NDArray[np.float64], npt.NDArray[np.bool_], float
-    ]  # cells, values, which press, seconds since the frame before
-
-
 @dataclass(frozen=True, slots=True)
 class RestEvent:
-    """A change in what cells read at rest, or in what can be told apart.
+    """A change in what cells read at rest, or in what lies apart.
 
     Attributes:
         kind: `tare`; `interrupted`: a tare that begins anew, for the port went away;
@@ -124,21 +128,14 @@ class Rest:
         if calibration is not None:
             top = calibration.top(sensor.full)
             self.bare = Sensor(*shape, STEPS, top=top, unit=calibration.unit)
-        self._baseline = np.zeros(shape)
-        if sensor.baseline:
-            self._baseline += np.array(sensor.baseline).reshape(shape)
-        self._is_masked = is_masked(sensor)
-        self._is_free = ~self._is_masked
         self._time: float | None = None
-        self._below = np.zeros(shape, np.int64)
-        self._alone_s = np.zeros(shape)
         self._has_pressed = np.zeros(shape, np.bool_)
         self._is_around = np.zeros(shape, np.bool_)  # in the placement of now
         self._placements = np.zeros(shape, np.int64)
         self._tare_frames = 0
         self._tared: list[Cells] = []
         self._events: list[RestEvent] = []
-        self._waiting: _Followed | None = None
+        self.restart(sensor)
 
     @property
     def is_taring(self) -> bool:
@@ -149,11 +146,7 @@ class Rest:
     def sensor(self) -> Sensor:
         """The sensor as of now: its baseline in whole numbers, and all masked cells."""
         rests = np.rint(self._baseline).clip(0, self._sensor.full).astype(np.int64)
-        return msgspec.structs.replace(
-            self._sensor,
-            baseline=tuple(rests.reshape(-1).tolist()) if rests.any() else (),
-            masked=_places(self._is_masked),
-        )
+        return at_rest(self._sensor, rests, self._is_masked)
 
     @property
     def tare_text(self) -> str:
@@ -172,14 +165,12 @@ class Rest:
 
     def restart(self, sensor: Sensor) -> None:
         """Take the baseline and the masked cells of a sensor, as after a tare."""
-        self._waiting = None
-        self._baseline[:] = 0.0
-        if sensor.baseline:
-            self._baseline += np.array(sensor.baseline).reshape(self._baseline.shape)
+        self._waiting: _Followed | None = None
+        self._baseline = baseline_of(sensor).astype(np.float64)
         self._is_masked = is_masked(sensor)
         self._is_free = ~self._is_masked
-        self._below[:] = 0
-        self._alone_s[:] = 0.0
+        self._below = np.zeros(self._baseline.shape, np.int64)
+        self._alone_s = np.zeros(self._baseline.shape)
 
     def news(self) -> list[RestEvent]:
         """Return what has changed since the last time."""
@@ -283,7 +274,7 @@ class Rest:
         if where.any():
             self._is_masked |= where
             self._is_free = ~self._is_masked
-            self._events.append(RestEvent(kind, _places(where)))
+            self._events.append(RestEvent(kind, places(where)))
 
 
 def _neighbours(pressed: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -296,7 +287,3 @@ def _neighbours(pressed: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     wide[1:-1, 1:-1] = pressed
     steps = ((1, 0), (1, 2), (0, 1), (2, 1), (0, 0), (0, 2), (2, 0), (2, 2))
     return np.stack([wide[r : r + rows, c : c + columns] for r, c in steps])
-
-
-def _places(where: npt.NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
-    return tuple((int(row), int(column)) for row, column in np.argwhere(where))

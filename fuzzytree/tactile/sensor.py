@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-from msgspec import Meta, inspect
+from msgspec import Meta, inspect, structs
 
 from fuzzytree.errors import InvalidModelError, TableError
 from fuzzytree.model import Mistake, Value
@@ -189,8 +189,7 @@ def pressed(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
     # 64 bits without a sign reach beyond those with one: clip first
     values = np.clip(check_frames(sensor, frames), 0, sensor.full).astype(np.int64)
     if sensor.baseline:
-        baseline = np.array(sensor.baseline, np.int64)
-        values -= baseline.reshape(sensor.rows, sensor.columns)
+        values -= baseline_of(sensor)
     values[values <= sensor.threshold] = 0
     values[:, is_masked(sensor)] = 0
     return values
@@ -205,9 +204,8 @@ def offsets(sensor: Sensor) -> tuple[int, ...]:
         >>> offsets(Sensor(1, 2, masked=((0, 1),))), offsets(Sensor(1, 2))
         ((0, 255), ())
     """
-    baseline = np.array(sensor.baseline or [0] * (sensor.rows * sensor.columns))
-    found = np.where(is_masked(sensor).reshape(-1), sensor.full, baseline)
-    return tuple(found.tolist()) if found.any() else ()
+    found = np.where(is_masked(sensor), sensor.full, baseline_of(sensor))
+    return tuple(found.reshape(-1).tolist()) if found.any() else ()
 
 
 def saturated(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
@@ -215,6 +213,38 @@ def saturated(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
     full = (check_frames(sensor, frames) >= sensor.full) & ~is_masked(sensor)
     count: npt.NDArray[np.int64] = full.sum(axis=(1, 2))
     return count
+
+
+def baseline_of(sensor: Sensor) -> npt.NDArray[np.int64]:
+    """Return what cells read when nothing presses: shape (rows, columns)."""
+    shape = (sensor.rows, sensor.columns)
+    if not sensor.baseline:
+        return np.zeros(shape, np.int64)
+    return np.array(sensor.baseline, np.int64).reshape(shape)
+
+
+def at_rest(
+    sensor: Sensor, baseline: npt.NDArray[np.int64], masked: npt.NDArray[np.bool_]
+) -> Sensor:
+    """Return a sensor with another baseline and other masked cells.
+
+    Args:
+        sensor: The sensor.
+        baseline: Of shape (rows, columns), in 0 to `full`.
+        masked: Of shape (rows, columns).
+
+    Example:
+        >>> found = at_rest(Sensor(1, 2), np.array([[3, 0]]), np.array([[False, True]]))
+        >>> found.baseline, found.masked
+        ((3, 0), ((0, 1),))
+    """
+    known = tuple(baseline.reshape(-1).tolist()) if baseline.any() else ()
+    return structs.replace(sensor, baseline=known, masked=places(masked))
+
+
+def places(where: npt.NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
+    """Return the (row, column) of each cell of which something is true."""
+    return tuple((int(row), int(column)) for row, column in np.argwhere(where))
 
 
 def is_masked(sensor: Sensor) -> npt.NDArray[np.bool_]:

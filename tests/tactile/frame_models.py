@@ -11,9 +11,13 @@ from fuzzytree.api.verbs import learn
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.tactile.cli.features import USUAL
 from fuzzytree.tactile.features.aimed import aimed_frames
+from fuzzytree.tactile.features.names import names_of
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.simulation.objects import OBJECTS
+from fuzzytree.tactile.simulation.physics import press
 
 PLAIN = Sensor(16, 16, threshold=4)
 WIDE = Sensor(
@@ -25,6 +29,16 @@ WIDE = Sensor(
     masked=((1, 2), (4, 6)),
 )
 SMALL = Sensor(6, 4, full=100)
+
+
+@functools.cache
+def pressed_tree(count: int, features: str = USUAL, seed: int = 1) -> FuzzyTree:
+    """Return a tree on so many simulated presses of each of the paper's objects."""
+    frames = np.concatenate([press(name, count, seed).frames for name in OBJECTS])
+    names, sensor = names_of(features), press("circle", 1).sensor
+    values = features_of(sensor, frames, names).values.T
+    labels = [name for name in OBJECTS for _ in range(count)]
+    return learn(table(values, columns=names), target=labels)
 
 
 @functools.cache

@@ -31,8 +31,11 @@ from fuzzytree.tactile.sensor import (
     Counters,
     Frame,
     Sensor,
+    at_rest,
+    baseline_of,
     check_frames,
     is_masked,
+    places,
 )
 
 MAGIC: Final = b"\x89FTR\r\n\x1a\n"
@@ -143,18 +146,14 @@ def _record(
 
 def _rest_cells(sensor: Sensor) -> Cells:
     """Return what cells read at rest as a frame; masked cells read the largest."""
-    shape = (sensor.rows, sensor.columns)
-    baseline = np.array(sensor.baseline or [0] * math.prod(shape)).reshape(shape)
-    return np.where(is_masked(sensor), sensor.largest, baseline)
+    return np.where(is_masked(sensor), sensor.largest, baseline_of(sensor))
 
 
 def _rest_sensor(sensor: Sensor, cells: Cells) -> Sensor:
     """Return a sensor with what its cells read at rest."""
     is_hot = cells >= sensor.largest
     found = np.where(is_hot, 0, np.minimum(cells, sensor.full)).astype(np.int64)
-    masked = tuple((int(row), int(column)) for row, column in np.argwhere(is_hot))
-    baseline = tuple(found.reshape(-1).tolist()) if found.any() else ()
-    return msgspec.structs.replace(sensor, baseline=baseline, masked=masked)
+    return at_rest(sensor, found, is_hot)
 
 
 def _unpacked(content: bytes, layout: np.dtype[np.void]) -> FrameRecord | None:
@@ -618,6 +617,6 @@ def review(file: FrameFile) -> Review:
         missing,
         file.damaged,
         file.cut_bytes,
-        tuple((int(row), int(column)) for row, column in np.argwhere(is_still)),
+        places(is_still),
         last.counters if last else Counters(),
     )

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fuzzytree.errors import TableError
 from fuzzytree.tactile.boards import Board
-from fuzzytree.tactile.sensor import Cells, check_frames, is_masked
+from fuzzytree.tactile.sensor import Cells, check_frames, is_masked, places
 
 Places = npt.NDArray[np.bool_]
 
@@ -37,7 +37,7 @@ def measured(board: Board, frames: Cells) -> Board:
     """
     baseline = _baseline(board, frames)
     known = board.sensor.masked
-    hot = [place for place in _places(_hot(board, baseline)) if place not in known]
+    hot = [place for place in places(_hot(board, baseline)) if place not in known]
     sensor = msgspec.structs.replace(
         board.sensor,
         baseline=tuple(baseline.reshape(-1).tolist()),
@@ -64,16 +64,16 @@ def remarks(board: Board, frames: Cells) -> list[str]:
     says: list[str] = []
     if is_hot.any():
         share = f"{board.start.hot:.0%} of full"
-        says.append(f"at rest above {share}, masked: {named(_places(is_hot))}")
+        says.append(f"at rest above {share}, masked: {named(places(is_hot))}")
     if (is_hot[:, 1:] & is_hot[:, :-1]).any() or (is_hot[1:] & is_hot[:-1]).any():
         says.append("some of these lie side by side: does something lie on the sensor?")
     if is_touched.any():
         text = "moved by more than a quarter of full (was the sensor touched?)"
-        says.append(f"{text}: {named(_places(is_touched))}")
+        says.append(f"{text}: {named(places(is_touched))}")
     is_still = still(board, found)
     if is_still.any():
         text = "never moved though both neighbours did (dead?), not masked"
-        says.append(f"{text}: {named(_places(is_still))}")
+        says.append(f"{text}: {named(places(is_still))}")
     return says
 
 
@@ -118,7 +118,3 @@ def _hot(board: Board, baseline: npt.NDArray[np.int64]) -> Places:
     """Return which cells rest too high, of those that are not masked already."""
     is_hot: Places = baseline > board.start.hot * board.sensor.full
     return is_hot & ~is_masked(board.sensor)
-
-
-def _places(is_so: Places) -> list[tuple[int, int]]:
-    return [(int(row), int(column)) for row, column in np.argwhere(is_so)]

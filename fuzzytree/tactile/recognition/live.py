@@ -410,13 +410,13 @@ class Live:
         for place, (region, (number, code)) in enumerate(
             zip(found, voted, strict=True)
         ):
-            is_known = code is not None and code >= 0
+            known = -1 if code is None else code  # the vote is not over
             objects.append(
                 SensorObject(
                     number,
-                    State.OBJECT if is_known else State.UNKNOWN,
-                    code if code is not None and is_known else -1,
-                    seen.classes[code] if code is not None and is_known else "",
+                    State.UNKNOWN if known < 0 else State.OBJECT,
+                    known,
+                    "" if known < 0 else seen.classes[known],
                     tuple(seen.strengths[:, place].tolist()),
                     region,
                     self.recogniser,

@@ -116,30 +116,23 @@ def open_sensor(
     seed: int = 0,
     say: Callable[[str, str], None] | None = None,
 ) -> TactileSensor:
-    """Open a sensor, measure its baseline, and begin to read frames.
+    """Open a sensor, as `fuzzytree.tactile.open` describes, for a model that is read.
 
     Args:
-        source: A serial port, a recording, an archive (.npz) or a table (.csv) of
-            frames, or `simulator`.
+        source: As there.
         model: A tree or a rule base whose inputs are names of features.
-        board: What is connected to the port, or sent the frames of an archive or a
-            table, or its file; none for other sources.
-        reject: The strength below which an object is unknown; the usual one if None.
-        vote_s: How long the answers to an object vote; 0 for each frame's own.
+        board: As there; so are all that follow but the last.
+        reject: The strength below which an object is unknown.
+        vote_s: How long the answers to an object vote.
         least_area: The fewest cells of an object.
         record: A recording to write every frame to.
-        speed: Of a recording or the simulator; 0 for no pauses.
+        speed: Of a recording or the simulator.
         seed: Of the simulator.
         say: Called with a word and a sentence on what is waited for.
 
     Raises:
-        ValueError: If source and board do not go together, or a number is out of
-            range.
-        TableError: If the model's inputs are no features of frames.
-        PortError: If the port cannot be used, or frames stop before the baseline is
-            measured.
-        ReadError: If a file is none of its kind.
-        WriteError: If the recording cannot be made.
+        FuzzyTreeError: As there.
+        ValueError: As there.
     """
     with contextlib.ExitStack() as stack:
         found, used, remarks = _source(source, board, record, speed, seed, say)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
-import fuzzytree as ft
-from fuzzytree.tactile.cli.features import USUAL
 from fuzzytree.tactile.link.recording import FrameRecord
 from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
@@ -18,6 +15,7 @@ from fuzzytree.tactile.recognition.recogniser import usual_floor
 from fuzzytree.tactile.sensor import Counters, Frame
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import press
+from tests.tactile.frame_models import pressed_tree
 
 Reading = npt.NDArray[np.float64]
 Change = Callable[[Reading, float], Reading]
@@ -25,16 +23,6 @@ Change = Callable[[Reading, float], Reading]
 FRAMES_A_SECOND = 44
 RISE, STAY, REST = 4, 12, 8
 EMPTY = 30  # frames at the start
-
-
-@functools.cache
-def taught(count: int, seed: int = 1) -> ft.FuzzyTree:
-    frames = np.concatenate([press(name, count, seed).frames for name in OBJECTS])
-    sensor = press("circle", 1).sensor
-    values = ft.tactile.features_of(frames, USUAL, sensor)
-    labels = [name for name in OBJECTS for _ in range(count)]
-    columns = ft.tactile.names_of(USUAL)
-    return ft.learn(ft.table(values, columns=columns), target=labels)
 
 
 def placements(count: int, change: Change) -> Iterator[tuple[FrameRecord, int]]:
@@ -64,7 +52,7 @@ def placements(count: int, change: Change) -> Iterator[tuple[FrameRecord, int]]:
 
 def share_right(count: int, change: Change, presses: int = 60) -> float:
     """Return of how many placements most frames are recognised, of 7 times `count`."""
-    tree, sensor = taught(presses), press("circle", 1).sensor
+    tree, sensor = pressed_tree(presses), press("circle", 1).sensor
     pairs = [*placements(count, change)]
     source = Paced((record for record, _ in pairs), 0.0)
     live = Live(tree, sensor, source, "lab", reject=usual_floor(tree))

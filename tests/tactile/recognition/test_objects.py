@@ -8,10 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-import fuzzytree as ft
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
-from fuzzytree.tactile.cli.features import USUAL
 from fuzzytree.tactile.link.recording import FrameRecord
 from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
@@ -21,6 +19,7 @@ from fuzzytree.tactile.rest import RestEvent
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import press
+from tests.tactile.frame_models import pressed_tree
 
 
 def squares(
@@ -95,18 +94,9 @@ def test_a_vote_needs_more_than_half_to_change() -> None:
     assert shown.index(1) > 31
 
 
-def taught(count: int = 60) -> ft.FuzzyTree:
-    frames = np.concatenate([press(name, count, 1).frames for name in OBJECTS])
-    sensor = press("circle", 1).sensor
-    names = [*ft.tactile.names_of(USUAL)]
-    values = ft.tactile.features_of(frames, USUAL, sensor)
-    labels = [name for name in OBJECTS for _ in range(count)]
-    return learn(table(values, columns=names), target=labels)
-
-
 @pytest.mark.heavy
 def test_nine_of_ten_objects_are_right_where_two_lie_there() -> None:
-    tree, random = taught(), np.random.default_rng(0)
+    tree, random = pressed_tree(60), np.random.default_rng(0)
     names = list(OBJECTS)
     fresh = {name: press(name, 30, 99).frames for name in names}
     pairs = [random.choice(names, 2).tolist() for _ in range(200)]

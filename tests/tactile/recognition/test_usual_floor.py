@@ -7,15 +7,12 @@ import functools
 import numpy as np
 import pytest
 
-from fuzzytree import table
-from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.cli.features import USUAL
-from fuzzytree.tactile.features.names import names_of
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State, usual_floor
-from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.sensor import Cells
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import press
+from tests.tactile.frame_models import pressed_tree
 
 
 def pressed_frames(count: int, seed: int) -> Cells:
@@ -25,10 +22,7 @@ def pressed_frames(count: int, seed: int) -> Cells:
 @functools.cache
 def usual_recogniser(count: int, features: str = USUAL) -> Recogniser:
     """Return what recognises as usual, from so many presses of each object."""
-    sensor, names = press("circle", 1).sensor, names_of(features)
-    values = features_of(sensor, pressed_frames(count, 1), names).values.T
-    labels = [name for name in OBJECTS for _ in range(count)]
-    tree = learn(table(values, columns=names), target=labels)
+    tree, sensor = pressed_tree(count, features), press("circle", 1).sensor
     return Recogniser(tree, sensor, usual_floor(tree))
 
 
