@@ -526,8 +526,14 @@ def write_recording(path: PathLike, file: FrameFile) -> None:
     """
     with open_atomically(path, replace=False) as output:
         output.write(header(file.board, file.started_ns))
-        for frame, counters in file:
-            output.write(_packed(frame, counters, file.board))
+        stated, before = file.sensor, None
+        for record in file:
+            if file.sensor is not stated and before is not None:
+                stated = file.sensor
+                cells = _rest_cells(stated)
+                output.write(_record(REST, *before, cells, file.board))
+            output.write(_packed(*record, file.board))
+            before = record
 
 
 def _to_disk(file: int) -> None:

@@ -442,4 +442,7 @@ def test_what_cells_read_at_rest_since_a_frame_is_in_the_recording(
     expected = tuple(0 if place in (6, 8) else place for place in range(12))
     assert sensors[:2] == [BOARD.sensor] * 2
     assert (sensors[2].baseline, sensors[2].masked) == (expected, tared.masked)
+    with records.RecordingFile(path) as file:
+        records.write_recording(tmp_path / "b.ftr", file)
+    assert (tmp_path / "b.ftr").read_bytes() == path.read_bytes()
     assert records.read_recording(path).frames.tolist() == _frames(3).tolist()
