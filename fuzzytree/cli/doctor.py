@@ -24,6 +24,9 @@ from fuzzytree.errors import (
 
 ABSENT = "not installed"
 
+NEEDED = "needed"
+"""What the packages are called that are always there."""
+
 FOR_TESTS = ("witnesses", "peers")
 """The extras that only the test suite and the benchmarks use."""
 
@@ -64,11 +67,9 @@ class DoctorOptions:
 def command(options: DoctorOptions) -> int:
     """Report versions and extras; learn, write, read and run a small model.
 
-    Exit 1 if the small model fails. The packages that only the test suite and the
-    benchmarks use, and those that are not installed, are listed by `--verbose`.
+    Exit 1 if the small model fails. The extras that only the test suite and the
+    benchmarks use are listed by `--verbose`.
     """
-    from fuzzytree import report
-
     known = packages()
     versions = {
         "fuzzytree": fuzzytree.__version__,
@@ -84,12 +85,19 @@ def command(options: DoctorOptions) -> int:
         answer(f"self-test failed: {fault}")
     if not faults:
         answer("self-test passed: learning, writing, reading and running agree")
-    hidden = {name for extra in FOR_TESTS for name in known.get(extra, ())}
-    hidden |= {name for name, version in versions.items() if version == ABSENT}
-    shown = [one for one in versions.items() if options.verbose or one[0] not in hidden]
-    answer("\n".join(report.aligned(shown)))
+    answer(f"fuzzytree {fuzzytree.__version__}, Python {platform.python_version()}")
+    shown = [extra for extra in known if options.verbose or extra not in FOR_TESTS]
+    table = click.HelpFormatter(width=88)
+    table.write_dl(
+        [
+            (extra or NEEDED, ", ".join(f"{name} {versions[name]}" for name in there))
+            for extra in shown
+            if (there := [one for one in known[extra] if versions[one] != ABSENT])
+        ]
+    )
+    answer(table.getvalue().rstrip())
     for extra in missing:
-        if options.verbose or extra not in FOR_TESTS:
+        if extra in shown:
             answer(f"extra {extra!r} is not installed; it needs {install_hint(extra)}")
     return 1 if faults else 0
 

@@ -6,8 +6,10 @@ import functools
 import importlib.metadata
 import json
 
+import numpy as np
 import pytest
 
+import fuzzytree
 from fuzzytree.checking.abilities import Ability, abilities_of
 from fuzzytree.exporters.table import TABLE, all_formats, find_format
 from fuzzytree.runtimes.predictions import Predictions
@@ -67,7 +69,8 @@ def test_the_doctor_reports_versions_and_tries_everything(call: Call) -> None:
     assert (code, err) == (0, "")
     said = "self-test passed: learning, writing, reading and running agree"
     assert out.splitlines()[0] == said
-    assert out.splitlines()[1].split()[0] == "fuzzytree"
+    assert out.splitlines()[1].startswith(f"fuzzytree {fuzzytree.__version__}, Python ")
+    assert f"numpy {np.__version__}," in " ".join(out.split())
     assert "selenium" not in out
     assert "selenium" in call("doctor", "--verbose")[1]
 
