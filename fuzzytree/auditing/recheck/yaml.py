@@ -13,6 +13,8 @@ MOST_LEVELS = 32
 
 _KEY = re.compile(r"((?:0 )?[a-z][a-z ]*):(?: +|$)")
 _QUOTED = re.compile(r"'((?:[^']|'')*)'|\"((?:[^\"\\]|\\.)*)\"")
+_NAME = re.compile(rf"({_QUOTED.pattern}|[^ ,'\"\[\]{{}}][^,\[\]{{}}]*?):(?: +)")
+"""A key in braces, which may be the name of a class."""
 _PART = re.compile(
     rf"(?<![^ \[{{,])(?:{_QUOTED.pattern}|(?P<open>['\"]))|(?<![^ ])(?P<comment>#)|."
 )
@@ -181,14 +183,16 @@ class _Reader:
         is_list, pairs, items = text[at] == "[", dict[str, Any](), list[Any]()
         close, at = "]" if is_list else "}", _behind_blanks(text, at + 1)
         while text[at : at + 1] != close:
-            key = None if is_list else _KEY.match(text, at)
+            key, name = None if is_list else _NAME.match(text, at), ""
             if key is None and not is_list:
                 self.fail(f"no key: {text[at : at + 40]!r}")
-            if key and key[1] in pairs:
-                self.fail(f"the key {key[1]!r} stands twice")
+            if key:
+                name = str(self._scalar(key[1]))
+            if name in pairs:
+                self.fail(f"the key {name!r} stands twice")
             item, at = self._flow(text, key.end() if key else at, level + 1)
             items.append(item)
-            pairs |= {key[1]: item} if key else {}
+            pairs |= {name: item} if key else {}
             at = _behind_blanks(text, at)
             if text[at : at + 1] == ",":
                 at = _behind_blanks(text, at + 1)

@@ -177,3 +177,11 @@ def test_degrees_lie_in_what_encloses_them(seed: int) -> None:
                 for x in (a, b, *(one for one in places if a < one < b)):
                     degree = term.height * term.function.degree(Doubles(), x)
                     assert low - 1e-12 <= degree <= high + 1e-12, (curve, x)
+
+
+def test_a_key_in_braces_is_any_name_of_a_class() -> None:
+    found = read_yaml(b"p: {'a: b': 0.5, hand-0: 0.25, \"q, {\": 1, a:b: 2}\n", "x")
+    assert found == {"p": {"a: b": 0.5, "hand-0": 0.25, "q, {": 1, "a:b": 2}}
+    for wrong in (b"p: {a: 1, 'a': 2}\n", b"p: {: 1}\n", b"p: {a, b: 1}\n"):
+        with pytest.raises(CannotRunError):
+            read_yaml(wrong, "x")
