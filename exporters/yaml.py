@@ -286,6 +286,9 @@ def _semantics(semantics: Semantics) -> dict[str, Entry]:
     if semantics.sharpness:
         note = "the power of the strengths that weigh probabilities"
         entries["sharpness"] = Noted(semantics.sharpness, note)
+    if semantics.floor is not msgspec.UNSET:
+        note = "a weaker raw rule knows nothing like the row"
+        entries["floor"] = Noted(semantics.floor, note)
     return entries
 
 

@@ -22,8 +22,9 @@ from fuzzytree.learning import (
     class_weights,
     learn_arrays,
 )
-from fuzzytree.model import FloatArray, FuzzyTree, IntArray
+from fuzzytree.model import USUAL_FLOOR, FloatArray, FuzzyTree, IntArray
 from fuzzytree.runtimes import baseline
+from fuzzytree.semantics import rules_from_tree
 from fuzzytree.tables import Table
 
 if TYPE_CHECKING:
@@ -41,6 +42,9 @@ _CLASSES = 5000
 _COLUMNS = 200_000
 """The most columns times folds that are learnt; at least one fold is tried."""
 
+MOST_WEAK = 0.05
+"""The largest share of rows, of groups that were left out, below the usual floor."""
+
 _FEWEST = 2 * FOLDS  # rows
 
 
@@ -52,16 +56,24 @@ class Accuracy(msgspec.Struct, frozen=True):
             classes. A row that gets no class counts as wrong.
         rows: How many rows the folds are made of.
         of: How many rows the table has.
+        weak: The share of the rows of groups that were left out for which the raw rule
+            that decides is weaker than `USUAL_FLOOR`; None without groups or sets.
     """
 
     folds: tuple[float, ...]
     rows: int
     of: int
+    weak: float | None = None
 
     @property
     def mean(self) -> float:
         """The mean over the folds."""
         return sum(self.folds) / len(self.folds)
+
+    @property
+    def floor(self) -> float:
+        """The floor of strengths: 0 if the usual one rejects more than `MOST_WEAK`."""
+        return USUAL_FLOOR if (self.weak or 0.0) <= MOST_WEAK else 0.0
 
 
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
@@ -167,6 +179,7 @@ def accuracy(
         )
         fold = folds_of(codes[first], folds, seed)[group]
     shares: list[float] = []
+    strengths: list[float] = []
     weights = _weights(table, settings)
     most = min(_CLASSES // len(table.classes), _COLUMNS // width)
     tried = max(1, min(folds, most))
@@ -189,11 +202,16 @@ def accuracy(
             categories=table.categories,
             weights=None if table.row_weights is None else table.row_weights[kept],
         )
-        predicted = _answered(learnt.tree, table, test)
+        rules, predicted = _answered(learnt.tree, table, test)
+        if groups is not None and learnt.tree.sets:
+            strengths += _strengths(learnt.tree, table, test, rules)
         right = predicted == table.codes[test]
         weight = None if weights is None else weights[test]
         shares.append(float(np.average(right, weights=weight)))
-    return Accuracy(tuple(shares), len(rows), table.rows) if shares else None
+    if not shares:
+        return None
+    weak = float(np.mean(np.array(strengths) < USUAL_FLOOR)) if strengths else None
+    return Accuracy(tuple(shares), len(rows), table.rows, weak)
 
 
 def grouped(table: Table, column: str) -> tuple[Table, IntArray]:
@@ -292,11 +310,31 @@ def _by_class(codes: IntArray, seed: int) -> npt.NDArray[np.intp]:
     return shuffled[np.argsort(codes[shuffled], kind="stable")]
 
 
-def _answered(tree: FuzzyTree, table: Table, rows: IntArray) -> IntArray:
-    """Return the code of the class of each row; -1 for none."""
+def _values(tree: FuzzyTree, table: Table, rows: IntArray) -> FloatArray:
+    """Return what a tree needs of some rows: shape (inputs, rows)."""
     position = {name: k for k, name in enumerate(table.columns)}
     chosen = np.array([position[name] for name in tree.inputs], np.int64)
     values: FloatArray = table.values[np.ix_(chosen, rows)]
+    return values
+
+
+def _answered(
+    tree: FuzzyTree, table: Table, rows: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Return the leaf of each row, and the code of its class; 0 and -1 for none."""
     code = {label: k for k, label in enumerate(table.classes)}
     ends = np.array([-1, *(code[leaf.label] for leaf in tree.leaves)], np.int64)
-    return ends[baseline().load(tree)(values).rule]
+    found = baseline().load(tree)(_values(tree, table, rows)).rule
+    return found, ends[found]
+
+
+def _strengths(
+    tree: FuzzyTree, table: Table, rows: IntArray, rules: IntArray
+) -> list[float]:
+    """Return what the raw rules have that decide for some rows."""
+    run = baseline().load(rules_from_tree(tree, "raw"))
+    found = run(_values(tree, table, rows)).strengths
+    if found is None:  # rules that are fired have strengths
+        raise TypeError(f"{tree.name}: no strengths")
+    own = found[np.maximum(rules - 1, 0), np.arange(len(rules))]
+    return np.where(rules > 0, np.nan_to_num(own), 0.0).tolist()

@@ -254,6 +254,9 @@ def _learnt(
         if groups is not None:
             said = f"folds of whole groups; {said}"
             rows += _few_groups(found, groups)
+            if tested is not None and tested.weak is not None:
+                learnt = _with_floor(learnt, tested.floor)
+                rows.append(_floor_row(tested))
         rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
         if groups is None:  # its folds know none
             small = front(found, settings)
@@ -262,22 +265,39 @@ def _learnt(
         rows.append(_drawn(small, options.front, _title(options)))
     facts = _summary(found, noticed, learnt, tested, settings, options.output)
     facts = msgspec.structs.replace(facts, front=small)
-    return tree, rows, facts
+    return learnt.tree, rows, facts
+
+
+def _with_floor(learnt: Learnt, floor: float) -> Learnt:
+    """Return a tree whose semantics state the floor of strengths."""
+    semantics = msgspec.structs.replace(learnt.tree.semantics, floor=floor)
+    tree = msgspec.structs.replace(learnt.tree, semantics=semantics)
+    return msgspec.structs.replace(learnt, tree=tree)
+
+
+def _floor_row(tested: Accuracy) -> tuple[str, str, str]:
+    """Return a line about the floor of strengths, and why it is that one."""
+    weak = 100 * (tested.weak or 0.0)
+    text = f"0.001 rejects {weak:.1f} % of the rows left out"
+    return "floor", f"{tested.floor:g}", f"{text}; `tactile live` rejects what is below"
 
 
 def _few_groups(table: Table, groups: IntArray) -> Lines:
-    """Return a line for each class of few groups: its accuracy says little."""
+    """Return a line about classes of few groups: their accuracy says little."""
     import numpy as np
 
     from fuzzytree.report import counted
 
-    rows: Lines = []
-    for code, name in enumerate(table.classes):
-        count = len(np.unique(groups[table.codes == code]))
-        if count < FEW_GROUPS:
-            text = f"below {FEW_GROUPS}, more of its rows will be strange to the tree"
-            rows.append(("few", name, f"{counted(count, 'group')}: {text}"))
-    return rows
+    few = [
+        name
+        for code, name in enumerate(table.classes)
+        if len(np.unique(groups[table.codes == code])) < FEW_GROUPS
+    ]
+    if not few:
+        return []
+    names = ", ".join(few[:3]) + (" and others" if len(few) > 3 else "")
+    text = f"below {FEW_GROUPS} groups, more of their rows will be strange to the tree"
+    return [("few", counted(len(few), "class", "classes"), f"{names}: {text}")]
 
 
 def _front_rows(small: Front | None) -> Lines:

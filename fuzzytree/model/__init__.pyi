@@ -118,6 +118,7 @@ from .probabilities import WEIGHT_OF_ONE as WEIGHT_OF_ONE
 from .probabilities import Probabilities as Probabilities
 from .probabilities import parts_of as parts_of
 from .probabilities import squarings as squarings
+from .rulebase import USUAL_FLOOR as USUAL_FLOOR
 from .rulebase import Conjunction as Conjunction
 from .rulebase import Kind as Kind
 from .rulebase import Label as Label

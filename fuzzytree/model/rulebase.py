@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from typing import Literal
+from typing import Final, Literal
 
 import msgspec
 
@@ -86,6 +86,10 @@ Label = str | float | bool
 """The label of a class; a whole number is an `int`."""
 
 
+USUAL_FLOOR: Final = 0.001
+"""The floor of strengths of what was not measured: fitted sets end below it."""
+
+
 class Semantics(Value, frozen=True):
     """What the rules leave open and an answer depends on.
 
@@ -100,6 +104,9 @@ class Semantics(Value, frozen=True):
             "1" or "0.5", or a boolean, "False" or "True". Predictions have these.
         sharpness: The power of the strengths that weigh the rules' probabilities, one
             of 1, 2, 4, ..., 1024; unset in a model without probabilities.
+        floor: The strength of a raw rule below which a row is like none that was
+            learnt from, in [0, 1]; `fuzzytree tactile` uses it, and no answer here
+            depends on it. Unset where it was not measured.
     """
 
     conjunction: Conjunction = "minimum"
@@ -107,6 +114,7 @@ class Semantics(Value, frozen=True):
     missing: str | None = None
     label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
     sharpness: int | msgspec.UnsetType = msgspec.UNSET
+    floor: float | msgspec.UnsetType = msgspec.UNSET
 
 
 Kind = Literal["relative", "raw"]
@@ -259,6 +267,9 @@ def naming_mistakes(
 ) -> Iterator[Mistake]:
     """Yield what is wrong with a model's name, classes and default answers."""
     yield from sharpness_mistakes(semantics.sharpness)
+    if semantics.floor is not msgspec.UNSET and not 0.0 <= semantics.floor <= 1.0:
+        text = f"a floor of strengths lies in 0 to 1, not {semantics.floor!r}"
+        yield ("semantics", "floor"), text
     if not name:
         yield ("name",), "a model needs a name"
     fault = text_fault(name)

@@ -16,6 +16,7 @@ from fuzzytree.api.holdout import (
 )
 from fuzzytree.errors import TableError
 from fuzzytree.learning import LearningSettings
+from fuzzytree.model import USUAL_FLOOR
 from fuzzytree.tables import Table, read_table, table
 
 
@@ -140,6 +141,26 @@ def test_folds_of_whole_groups_do_not_learn_from_what_they_test_on() -> None:
     assert together is not None
     assert alone.mean > 0.9  # a row of the same group was learnt
     assert together.mean < 0.75
+
+
+@pytest.mark.parametrize(("spread", "floor"), [(1.0, 0.0), (0.01, USUAL_FLOOR)])
+def test_groups_unlike_the_others_lower_the_floor_of_strengths(
+    spread: float, floor: float
+) -> None:
+    random = np.random.default_rng(0)
+    places = 5.0 * (np.arange(8) % 2) + random.normal(0.0, spread, 8)  # of groups
+    values = np.repeat(places, 20) + random.normal(0.0, 0.02, 160)
+    codes = np.repeat(np.arange(8) % 2, 20)
+    found = Table("groups", ("x",), values[np.newaxis], ("a", "b"), codes)
+    tested = accuracy(found, LearningSettings(), groups=np.repeat(np.arange(8), 20))
+    assert tested is not None
+    assert tested.mean == 1.0
+    assert tested.weak is not None
+    assert (tested.weak > 0.05) == (floor == 0.0)
+    assert tested.floor == floor
+    alone = accuracy(found, LearningSettings())
+    assert alone is not None
+    assert (alone.weak, alone.floor) == (None, USUAL_FLOOR)
 
 
 def test_a_column_of_groups_must_be_there_for_every_row() -> None:

@@ -14,6 +14,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.cli.learn import command
 from fuzzytree.learning import LearningSettings
+from fuzzytree.model import fingerprint
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from tests.cli.conftest import Call
@@ -323,3 +324,33 @@ def test_a_column_of_weights_counts_in_the_tree_and_in_the_test(call: Call) -> N
     code, _, err = call("learn", "few.state", "--weight", "w", "-o", "few.yaml")
     assert code == 2
     assert "--weight: states count rows, which have no weights" in err
+
+
+def test_groups_that_are_left_out_choose_the_floor_of_strengths(call: Call) -> None:
+    random = np.random.default_rng(0)
+    lines = ["a,press,grip"]
+    for press in range(8):
+        place = 5.0 * (press % 2) + random.normal()
+        values = place + random.normal(0.0, 0.02, 20)
+        lines += [f"{one},{press},{'firm' if press % 2 else 'soft'}" for one in values]
+    Path("t.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    words = ("learn", "t.csv", "--target", "grip", "--groups", "press", "-o", "t.yaml")
+    code, _, err = call(*words)
+    assert code == 0
+    assert "few      2 classes firm, soft: below 10 groups" in err
+    said = r"floor    0 +0\.001 rejects [0-9.]+ % of the rows left out; `tactile live`"
+    assert re.search(said, err)
+    tree = ft.load("t.yaml")
+    assert isinstance(tree, FuzzyTree)
+    assert tree.semantics.floor == 0.0
+    facts = json.loads(call(*words, "--json")[1])
+    assert facts["fingerprint"] == fingerprint(tree)
+
+    text = Path("t.yaml").read_text("utf-8")
+    Path("old.yaml").write_text(text.replace("  floor: 0.0", "  floor: 0.1"), "utf-8")
+    changes = call("diff", "old.yaml", "t.yaml")[1]
+    assert "non-breaking the floor of strengths is 0.0, and was 0.1" in changes
+    Path("bad.yaml").write_text(text.replace("  floor: 0.0", "  floor: 1.5"), "utf-8")
+    code, _, err = call("show", "bad.yaml")
+    assert code == 2
+    assert "'floor' must be at most 1, not 1.5" in err

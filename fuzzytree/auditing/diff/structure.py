@@ -7,6 +7,8 @@ from collections import defaultdict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
+import msgspec
+
 from fuzzytree.auditing.diff.difference_records import Draft, Shown, renamed_model
 from fuzzytree.auditing.diff.matching import (
     Curves,
@@ -158,6 +160,13 @@ def _answer_drafts(
         text = f"the label type is {other.label_type or 'text'}"
         text += f", and was {one.label_type or 'text'}"
         yield Draft("class", text, "never", ("semantics",), ("semantics",))
+    if one.floor != other.floor:
+        was, now = (
+            "not measured" if floor is msgspec.UNSET else floor
+            for floor in (one.floor, other.floor)
+        )
+        text = f"the floor of strengths is {now}, and was {was}"
+        yield Draft("support", text, "never", ("semantics",), ("semantics",))
     if one.conjunction != other.conjunction:
         text = f"the AND of rules is {other.conjunction}, and was {one.conjunction}"
         path = ("semantics", "conjunction")

@@ -160,7 +160,7 @@ class Model:
         keys(
             meaning,
             f"and, uncovered, missing, {', '.join(MEANINGS[kind])}",
-            "label type, sharpness",
+            "label type, sharpness, floor",
         )
         if meaning["and"] not in ("minimum", "product"):
             raise CannotRunError("its AND is not known")

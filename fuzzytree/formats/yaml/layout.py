@@ -268,8 +268,9 @@ class VariableOfModel(FileRecord, frozen=True, kw_only=True):
     terms: tuple[TermOfVariable, ...] = ()
 
 
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Shares = Annotated[
-    dict[Name, Annotated[float, Meta(ge=0.0, le=1.0)]],
+    dict[Name, Share],
     Meta(
         description="the probability of each class, in millionths; classes that are "
         "left out share the rest evenly",
@@ -299,6 +300,7 @@ class RuleSemantics(FileRecord, frozen=True, kw_only=True):
     missing: Answer
     label_type: LabelType | None = field(name="label type", default=None)
     sharpness: Number | None = None
+    floor: Share | None = None
     answer: Literal["the class of the first of the strongest rules"]
 
 
@@ -311,6 +313,7 @@ class TreeSemantics(FileRecord, frozen=True, kw_only=True):
     missing: Answer
     label_type: LabelType | None = field(name="label type", default=None)
     sharpness: Number | None = None
+    floor: Share | None = None
     cuts: Literal["a value equal to a cut lies below it"]
     answer: Literal["the class of the leaf that the nodes lead to"]
 

@@ -191,6 +191,7 @@ def semantics(value: layout.RuleSemantics | layout.TreeSemantics | None) -> Sema
         _answer(value.missing),
         value.label_type or msgspec.UNSET,
         value.sharpness or msgspec.UNSET,
+        msgspec.UNSET if value.floor is None else value.floor,
     )
 
 

@@ -45,7 +45,7 @@ class TactileLiveOptions:
     reject: float | None = option(
         "--reject SHARE",
         "Firing strength below which an object is unknown; "
-        "default 0.001, or 0 for relative rules and trees of few rows.",
+        "default that of the model, else 0.001, or 0 for relative rules and few rows.",
         type=click.FloatRange(0.0, 1.0),
     )
     hold: int = option(

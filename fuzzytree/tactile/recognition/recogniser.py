@@ -9,7 +9,15 @@ import msgspec
 import numpy as np
 
 from fuzzytree.errors import TableError
-from fuzzytree.model import FloatArray, FuzzyTree, IntArray, Model, RuleBase, Run
+from fuzzytree.model import (
+    USUAL_FLOOR,
+    FloatArray,
+    FuzzyTree,
+    IntArray,
+    Model,
+    RuleBase,
+    Run,
+)
 from fuzzytree.runtimes import class_probabilities, load
 from fuzzytree.semantics import Status, rules_from_tree
 from fuzzytree.tactile.features.names import feature_of, has_unit
@@ -17,9 +25,6 @@ from fuzzytree.tactile.features.plain import State as State
 from fuzzytree.tactile.features.plain import check_reject
 from fuzzytree.tactile.runtimes.frames import Features, FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor, saturated
-
-USUAL_FLOOR = 0.001
-"""What is weaker lies beyond all that was learnt, unless one knows better."""
 
 FEW = 10
 """Rows of a class below which a tree rejects nothing by itself."""
@@ -172,9 +177,10 @@ def usual_floor(model: Model) -> float:
     """Return the floor of strength below which one usually rejects.
 
     Far from all that a model has learnt every fitted set is 0, and the class that is
-    nearest means nothing. Relative rules have no such strength: their floor is 0. So
-    is that of a tree that was taught a class with fewer than `FEW` rows: its sets end
-    where these few end, and rejected would be what it knows.
+    nearest means nothing. Relative rules have no such strength: their floor is 0. A
+    model that was learnt with groups left out states its own. Any other has the usual
+    one, but a tree that was taught a class with fewer than `FEW` rows has 0: its sets
+    end where these few end, and rejected would be what it knows.
 
     Example:
         >>> from fuzzytree import learn, table
@@ -189,6 +195,8 @@ def usual_floor(model: Model) -> float:
     """
     if strength_rules(model).kind == "relative":
         return 0.0
+    if model.semantics.floor is not msgspec.UNSET:
+        return model.semantics.floor
     if isinstance(model, FuzzyTree):
         taught = dict.fromkeys(model.classes, 0.0)
         for leaf in model.leaves:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import functools
 
+import msgspec
 import numpy as np
 import pytest
 
+from fuzzytree.model import USUAL_FLOOR
+from fuzzytree.semantics import rules_from_tree
 from fuzzytree.tactile.cli.features import USUAL
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State, usual_floor
 from fuzzytree.tactile.sensor import Cells
@@ -48,6 +51,17 @@ def test_features_that_are_not_divided_by_the_force_do_not() -> None:
     raw = usual_recogniser(60, "paper,orientation")
     assert share_right(raw, 0.8) < 0.8
     assert share_right(raw, 1.3) < 0.7
+
+
+def test_a_floor_that_was_measured_is_the_usual_one() -> None:
+    tree = pressed_tree(60)
+    semantics = msgspec.structs.replace(tree.semantics, floor=0.0)
+    measured = msgspec.structs.replace(tree, semantics=semantics)
+    assert usual_floor(tree) == USUAL_FLOOR
+    assert usual_floor(measured) == 0.0
+    raw = rules_from_tree(measured, "raw")
+    assert usual_floor(raw) == 0.0
+    assert usual_floor(rules_from_tree(measured)) == 0.0  # relative
 
 
 def test_few_presses_are_enough_for_the_usual_floor() -> None:
