@@ -337,4 +337,5 @@ def _strengths(
     if found is None:  # rules that are fired have strengths
         raise TypeError(f"{tree.name}: no strengths")
     own = found[np.maximum(rules - 1, 0), np.arange(len(rules))]
-    return np.where(rules > 0, np.nan_to_num(own), 0.0).tolist()
+    strengths: list[float] = np.where(rules > 0, np.nan_to_num(own), 0.0).tolist()
+    return strengths

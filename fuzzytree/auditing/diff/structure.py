@@ -161,11 +161,11 @@ def _answer_drafts(
         text += f", and was {one.label_type or 'text'}"
         yield Draft("class", text, "never", ("semantics",), ("semantics",))
     if one.floor != other.floor:
-        was, now = (
+        before, after = (
             "not measured" if floor is msgspec.UNSET else floor
             for floor in (one.floor, other.floor)
         )
-        text = f"the floor of strengths is {now}, and was {was}"
+        text = f"the floor of strengths is {after}, and was {before}"
         yield Draft("support", text, "never", ("semantics",), ("semantics",))
     if one.conjunction != other.conjunction:
         text = f"the AND of rules is {other.conjunction}, and was {one.conjunction}"
