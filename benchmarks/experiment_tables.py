@@ -17,6 +17,7 @@ import click
 import msgspec
 import numpy as np
 from commands import run
+from press import physics_settings
 
 from fuzzytree.cli.console import (
     ResultOptions,
@@ -29,7 +30,6 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
-from fuzzytree.tactile.cli.press import physics_settings
 from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.tactile.simulation.objects import OBJECTS
@@ -282,10 +282,10 @@ def command(options: TablesOptions) -> None:
         raise click.UsageError("choose --means or --effects")
     if options.is_each and (options.name != "all" or options.count < 2):
         raise click.UsageError("--effects needs all objects, and 2 presses of each")
-    settings = physics_settings(options.changes)
     names = tuple(OBJECTS) if options.name == "all" else (options.name,)
     facts: dict[str, object] = {}
     with wrong_options():
+        settings = physics_settings(options.changes)
         if options.means:
             table = compare(settings, options.seed, count=options.count, objects=names)
             facts["means"] = _means_facts(table)

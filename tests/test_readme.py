@@ -24,7 +24,7 @@ README = ROOT / "README.md"
 PAGES = [README, *sorted((ROOT / "docs" / "tutorials").glob("*.md"))]
 MOST_LINES, MOST_OUTPUT = 200, 11
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
-PROGRAM = f"{sys.executable} -m fuzzytree"
+PROGRAMS = {"fuzzytree": f"{sys.executable} -m fuzzytree", "python": sys.executable}
 CHANGING = (
     # Times, speeds and hashes depend on the machine and on versions.
     (re.compile(r"\d[\d., ]*(?=\s*(?:ns|us|µs|ms|s)\b)"), "0 "),
@@ -95,7 +95,8 @@ def _masked(text: str) -> str:
 
 def _rewritten_examples(text: str, folder: Path) -> str:
     """Return a page with its examples run again in a folder, in their order."""
-    (folder / "examples").symlink_to(ROOT / "examples")
+    for name in ("benchmarks", "examples"):
+        (folder / name).symlink_to(ROOT / name)
     (folder / "out").mkdir()
     pieces: list[str] = []
     end = 0
@@ -123,7 +124,8 @@ def _answered(session: str, folder: Path) -> Iterator[str]:
     for line in session.splitlines():
         if not line.startswith("$ "):
             continue
-        command = re.sub(r"(?<![\w./-])fuzzytree(?= )", lambda _: PROGRAM, line[2:])
+        pattern = rf"(?<![\w./-])({'|'.join(PROGRAMS)})(?= )"
+        command = re.sub(pattern, lambda found: PROGRAMS[found[0]], line[2:])
         done = subprocess.run(
             command, shell=True, cwd=folder, env=environment, check=True, text=True,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT,

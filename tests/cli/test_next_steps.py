@@ -7,6 +7,7 @@ import shlex
 import shutil
 from pathlib import Path
 
+import press
 import pytest
 
 from fuzzytree.exporters.table import TABLE
@@ -125,7 +126,7 @@ def test_what_a_suffix_does_not_say_is_not_checked(call: Call) -> None:
 
 @pytest.mark.heavy
 def test_the_steps_from_simulated_presses_lead_to_a_checked_tree(call: Call) -> None:
-    words = ("tactile", "press", "all", "--count", "4", "-o", "p.npz")
-    (features,) = steps(call, *words)
-    following = steps(call, *features, "-o", "t.csv")
+    press.main(["all", "--count", "4", "-o", "p.npz"])
+    words = ("tactile", "features", "p.npz", "--features", "S1, S9")
+    following = steps(call, *words, "-o", "t.csv")
     assert [each[0] for each in following] == ["learn", "check"]

@@ -9,7 +9,7 @@ import click
 from fuzzytree.cli import Verbs
 
 ACTIONS = (
-    *("ports", "record", "replay", "calibrate", "live", "press"),
+    *("ports", "record", "replay", "calibrate", "live"),
     *("features", "interpolate", "export", "check"),
 )
 """Each action is the `command` of the module `fuzzytree.tactile.cli.ACTION`."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import press
 import pytest
 from commands import run
 from tactile_bench import command
@@ -30,6 +31,8 @@ def test_the_commands_of_the_page_run(
         if "tactile_bench.py" in line:
             few = ["--rounds", "6", "--quiet"]
             assert run(command, [*words[1:], *few]) == 0, line
+        elif "press.py" in line:
+            press.main(words[1:])
         else:
             assert main(words) == 0, line
     (code,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
