@@ -260,11 +260,7 @@ def _write(
     }
     for name, content in files.items():
         write_atomically(folder / name, content)
-    tree = str(folder / "tree.yaml")
-    words = ["fuzzytree", "show", tree]
-    if task.name == "paper":
-        words = ["fuzzytree", "tactile", "live", "simulator", "--model", tree]
-    after = shlex.join(words)
+    after = shlex.join(["fuzzytree", "show", str(folder / "tree.yaml")])
     say_rows(
         ("wrote", f"{folder}/", ", ".join(files)), ("next", after, ""), quiet=quiet
     )

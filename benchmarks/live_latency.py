@@ -24,6 +24,7 @@ from multiprocessing.sharedctypes import SynchronizedArray
 from pathlib import Path
 
 import numpy as np
+from press import simulated
 from simulated_board import Wire, encoded
 
 from fuzzytree import table
@@ -33,7 +34,6 @@ from fuzzytree.tactile.boards import Board, Marker, Port
 from fuzzytree.tactile.cli.live import SWITCH_S
 from fuzzytree.tactile.cli.screen import Screen
 from fuzzytree.tactile.link import open_connection
-from fuzzytree.tactile.recognition.frame_sources import PAPER_BOARD, simulated
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.sensing import MOST_WAITING
 from fuzzytree.tactile.runtimes.frames import features_of
@@ -74,9 +74,9 @@ def paper_tree() -> FuzzyTree:
     rows: list[np.ndarray] = []
     labels: list[str] = []
     for name in OBJECTS:
-        frames = press(name, 50, seed=1).frames
-        rows.append(features_of(PAPER_BOARD.sensor, frames, FEATURES).values.T)
-        labels += [name] * len(frames)
+        found = press(name, 50, seed=1)
+        rows.append(features_of(found.sensor, found.frames, FEATURES).values.T)
+        labels += [name] * len(found.frames)
     return learn(table(np.concatenate(rows), columns=FEATURES), target=labels)
 
 
@@ -86,7 +86,7 @@ def latencies(
     """Return how long each answer took, in seconds, and how many were dropped."""
     board = Board(
         "paper",
-        PAPER_BOARD.sensor,
+        press("circle", 1).sensor,
         Marker("AA 55", checksum="crc16"),
         port=Port(baud=baud),
     )

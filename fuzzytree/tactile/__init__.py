@@ -34,7 +34,6 @@ def open(
     least_area: int = 2,
     record: PathLike | None = None,
     speed: float = 1.0,
-    seed: int = 0,
 ) -> TactileSensor:
     """Open a sensor: iterating gives what each frame shows, as it comes.
 
@@ -44,17 +43,16 @@ def open(
     and `y`. `tare()` takes what the cells read next for their baseline.
 
     Args:
-        source: A serial port, a recording, an archive (.npz) or a table (.csv) of
-            frames, or `simulator`.
+        source: A serial port, a recording, or an archive (.npz) or a table (.csv) of
+            frames.
         model: A tree or a rule base whose inputs are names of features, or its file.
         board: What is connected to the port, or sent the frames of an archive or a
-            table, or its file; none for other sources.
+            table, or its file; none for a recording.
         reject: The strength below which an object is unknown; the usual one if None.
         vote_s: How many seconds the answers to an object vote; 0 for each frame's own.
         least_area: The fewest cells of an object.
         record: A recording to write every frame to.
-        speed: Of a recording or the simulator; 0 for no pauses.
-        seed: Of the simulator.
+        speed: Of frames that are recorded; 0 for no pauses.
 
     Returns:
         The sensor. It must be closed: it is a context manager.
@@ -69,17 +67,21 @@ def open(
         WriteError: If the recording cannot be made.
 
     Example:
-        >>> import itertools
+        >>> import tempfile
         >>> import numpy as np
         >>> import fuzzytree as ft
         >>> areas = np.array([[12.0], [18.0], [60.0], [70.0]])
         >>> tree = ft.learn(
         ...     ft.table(areas, columns=["area"]), target=["bar", "bar", "hand", "hand"]
         ... )
-        >>> with ft.tactile.open("simulator", model=tree, speed=0) as sensor:
-        ...     frame = next(itertools.islice(sensor, 40, None))
+        >>> cells = np.zeros((1, 4, 6), np.uint8)
+        >>> cells[:, 1:, 2:] = 99
+        >>> path = tempfile.mkdtemp() + "/bar.npz"
+        >>> np.savez(path, frames=cells)
+        >>> with ft.tactile.open(path, model=tree) as sensor:
+        ...     frame = next(iter(sensor))
         >>> frame.cells.shape, [thing.label for thing in frame.objects]
-        ((16, 16), ['bar'])
+        ((4, 6), ['bar'])
     """
     from fuzzytree.api import opened
     from fuzzytree.model import FuzzyTree, RuleBase
@@ -99,7 +101,6 @@ def open(
         least_area=least_area,
         record=record,
         speed=speed,
-        seed=seed,
     )
 
 

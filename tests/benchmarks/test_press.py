@@ -10,6 +10,7 @@ import press as script
 import pytest
 from press import main
 
+from fuzzytree.tactile.link.recording import read_recording
 from fuzzytree.tactile.presses import read_presses
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import PAPER, PhysicsSettings, press
@@ -31,6 +32,18 @@ def test_presses_of_all_objects_are_written_with_their_labels() -> None:
     assert (found.sensor.full, found.sensor.threshold) == (255, PAPER.threshold)
     assert np.array_equal(found.frames[9:12], press("circle", 3, 9).frames)
     assert Path("a.npz").read_bytes() == Path("b.npz").read_bytes()
+
+
+def test_a_recording_shows_the_objects_one_after_another() -> None:
+    words = ("circle", "--frames", "90", "--set", "threshold=3")
+    for name in ("a.ftr", "b.ftr"):
+        main([*words, "-o", name])
+    found = read_recording("a.ftr")
+    assert found.frames.shape == (90, 16, 16)
+    assert found.frames[40].max() > 100
+    assert found.frames[88].max() <= 4
+    assert found.board.sensor.threshold == 3
+    assert Path("a.ftr").read_bytes() == Path("b.ftr").read_bytes()
 
 
 def test_a_setting_is_changed_by_name() -> None:
@@ -68,4 +81,4 @@ def test_the_documented_settings_are_those_that_there_are() -> None:
 
 
 def test_the_examples_give_what_they_show() -> None:
-    assert doctest.testmod(script) == (0, 1)
+    assert doctest.testmod(script) == (0, 3)

@@ -84,15 +84,9 @@ class TactileLiveOptions:
     record: str | None = option("--record FILE", "Recording to write the frames to.")
     speed: float = option(
         "--speed X",
-        "Speed of a recording or the simulator; 0 for no pauses.",
+        "Speed of frames that are recorded; 0 for no pauses.",
         type=click.FloatRange(0.0),
         default=1.0,
-    )
-    seed: int = option(
-        "--seed",
-        "Random seed of the simulator.",
-        type=click.IntRange(0),
-        default=0,
     )
     frames: int | None = option(
         "--frames N", "Number of frames to recognise.", type=click.IntRange(1)
@@ -105,11 +99,10 @@ class TactileLiveOptions:
 def command(options: TactileLiveOptions) -> int:
     """Recognise the objects on the sensor, frame by frame.
 
-    SOURCE is a serial port, a recording, frames in a numpy archive (.npz) or a table
-    (.csv), or `simulator`: the paper's objects one after another. A terminal shows a
-    picture, the classes and the strengths, and takes the keys t (tare), s and i;
-    elsewhere there is a line for each object that is newly recognised. Ctrl-C ends.
-    Exit 1 if --record ended before.
+    SOURCE is a serial port, a recording, or frames in a numpy archive (.npz) or a table
+    (.csv). A terminal shows a picture, the classes and the strengths, and takes the
+    keys t (tare), s and i; elsewhere there is a line for each object that is newly
+    recognised. Ctrl-C ends. Exit 1 if --record ended before.
     """
     from fuzzytree.tactile.recognition.recogniser import usual_floor
     from fuzzytree.tactile.recognition.sensing import open_sensor
@@ -135,7 +128,6 @@ def command(options: TactileLiveOptions) -> int:
                 least_area=options.area,
                 record=options.record,
                 speed=options.speed,
-                seed=options.seed,
                 say=tell,
             )
         stack.callback(sensor.close)

@@ -1,31 +1,20 @@
-"""Sources of frames: a serial port, a recording or the simulator, each at its pace."""
+"""Sources of frames: a serial port or a recording, each at its pace."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-
-import numpy as np
 
 from fuzzytree.errors import WriteError
 from fuzzytree.files import PathLike
-from fuzzytree.tactile.boards import Board, Marker
+from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.link.recording import FrameRecord, Recorder
 from fuzzytree.tactile.presses import open_frames
 from fuzzytree.tactile.recognition.live import FrameSource
-from fuzzytree.tactile.sensor import FRAMES_A_SECOND, Counters, Frame, Sensor
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import FULL, PAPER, SIDE, press
-
-PAPER_BOARD = Board(
-    "simulator", Sensor(SIDE, SIDE, FULL, PAPER.threshold), Marker("AA 55")
-)
-"""The board of the simulator."""
-
-_RISE, _STAY, _REST = 8, 64, 22  # frames of a simulated press
+from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
 
 class Paced:
@@ -39,6 +28,7 @@ class Paced:
         ValueError: If the speed is below 0.
 
     Example:
+        >>> import numpy as np
         >>> frame = Frame(np.zeros((2, 2), np.uint8), 0.01, 0)
         >>> source = Paced([FrameRecord(frame, Counters(frames=1))])
         >>> [seen.number for seen in source], source.counters.frames
@@ -262,33 +252,3 @@ class Newest:
             with self._news:
                 self._is_over = True
                 self._news.notify_all()
-
-
-def simulated(
-    seed: int = 0, *, names: Sequence[str] = tuple(OBJECTS)
-) -> Iterator[FrameRecord]:
-    """Give frames without end: the paper's objects, pressed one after another.
-
-    Between two of them the sensor is empty for half a second.
-
-    Raises:
-        ValueError: If there is no object of a name.
-
-    Example:
-        >>> first = next(simulated())
-        >>> first.frame.cells.shape, first.frame.time
-        ((16, 16), 0.0)
-    """
-    random = np.random.default_rng(seed)
-    shares = [*np.linspace(0.0, 1.0, _RISE), *[1.0] * _STAY]
-    shares += [*np.linspace(1.0, 0.0, _RISE), *[0.0] * _REST]
-    number = 0
-    while True:
-        for name in names:
-            cells = press(name, 1, int(random.integers(2**31))).frames[0]
-            for share in shares:
-                noisy = share * cells + random.normal(0.0, 0.5, cells.shape)
-                whole = np.rint(noisy).clip(0, 255).astype(np.uint8)
-                frame = Frame(whole, number / FRAMES_A_SECOND, number)
-                number += 1
-                yield FrameRecord(frame, Counters(frames=number))

@@ -44,7 +44,7 @@ _SHOWN_S = 3.0  # how long a sentence about a frame that is past stays
 
 
 class FrameSource(Protocol):
-    """Where frames come from: a line, a recording or the simulator."""
+    """Where frames come from: a line or a recording."""
 
     @property
     def counters(self) -> Counters:

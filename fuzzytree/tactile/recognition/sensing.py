@@ -1,4 +1,4 @@
-"""A sensor as a stream of answers: from a port, a recording or the simulator."""
+"""A sensor as a stream of answers: from a port or a recording."""
 
 from __future__ import annotations
 
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from fuzzytree.model import Model
     from fuzzytree.tactile.recognition.live import FrameSource
     from fuzzytree.tactile.sensor import Counters, Frame, Sensor
-
-SIMULATOR: Final = "simulator"
-"""The name of the source without any hardware."""
 
 MOST_WAITING: Final = 4
 """Frames that wait for an answer before older ones are dropped: the newest count."""
@@ -113,7 +110,6 @@ def open_sensor(
     least_area: int = LEAST_AREA,
     record: PathLike | None = None,
     speed: float = 1.0,
-    seed: int = 0,
     say: Callable[[str, str], None] | None = None,
 ) -> TactileSensor:
     """Open a sensor, as `fuzzytree.tactile.open` describes, for a model that is read.
@@ -126,8 +122,7 @@ def open_sensor(
         vote_s: How long the answers to an object vote.
         least_area: The fewest cells of an object.
         record: A recording to write every frame to.
-        speed: Of a recording or the simulator.
-        seed: Of the simulator.
+        speed: Of frames that are recorded.
         say: Called with a word and a sentence on what is waited for.
 
     Raises:
@@ -135,7 +130,7 @@ def open_sensor(
         ValueError: As there.
     """
     with contextlib.ExitStack() as stack:
-        found, used, remarks = _source(source, board, record, speed, seed, say)
+        found, used, remarks = _source(source, board, record, speed, say)
         stack.callback(found.close)
         recorded: sources.Recorded | None = None
         if record is not None:
@@ -165,15 +160,9 @@ def _source(
     board: Board | PathLike | None,
     record: PathLike | None,
     speed: float,
-    seed: int,
     say: Callable[[str, str], None] | None,
 ) -> tuple[FrameSource, Board, list[str]]:
     """Return where frames come from, the board that they fit, and remarks on it."""
-    if source == SIMULATOR:
-        if board is not None:
-            raise ValueError(f"a board is for a port; {source} has its own")
-        paced = sources.Paced(sources.simulated(seed), speed)
-        return paced, sources.PAPER_BOARD, []
     known = load_board(board) if isinstance(board, str | os.PathLike) else board
     if Path(source).is_file():
         replayed = sources.Replayed(source, speed, known)

@@ -70,6 +70,8 @@ def call(
         for number, cells in enumerate(SHOWN):
             frame = Frame(cells, number / 8, number)
             recorder.write(frame, Counters(frames=number + 1, damaged=2))
+    long = np.tile(np.array(SHOWN, np.uint8), (300, 4, 4))
+    np.savez_compressed("long.npz", frames=long)
 
     def run(*words: str) -> tuple[int, str, str]:
         code = main(["tactile", "live", *words])
@@ -157,17 +159,12 @@ def test_a_recording_that_is_there_is_not_written_over(call: Call) -> None:
     assert Path("some.ftr").read_bytes() == before
 
 
-def test_a_simulated_press_is_answered(call: Call) -> None:
-    words = ("simulator", "--model", "area.yaml", "--speed", "0", "--frames", "60")
-    code, out, _ = call(*words, "--reject", "0")
-    assert code == 0
-    assert "\tobject\t" in out
-
-
 def test_what_is_far_from_all_that_was_learnt_is_unknown_unless_one_requests(
     call: Call,
 ) -> None:
-    words = ("simulator", "--model", "area.yaml", "--speed", "0", "--frames", "60")
+    ten = np.arange(16).reshape(1, 4, 4) < 10
+    np.savez("ten.npz", frames=ten.repeat(9, axis=0).astype(np.uint8))
+    words = ("ten.npz", "--model", "area.yaml", "--speed", "0")
     _, out, err = call(*words, "--reject", "0.001")
     assert {row.split("\t")[2] for row in out.splitlines()} == {"unknown"}
     assert "no rule, or one below 0.001, decides; --reject sets it\n" in err
@@ -218,23 +215,9 @@ def test_a_recording_with_another_board_is_reported(call: Call) -> None:
     assert (code, err) == (2, f"{text}\n")
 
 
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (
-            ("none.ftr",),
-            "none.ftr is no recording; for a port, name its board",
-        ),
-        (
-            ("simulator", "--board", "mat.yaml"),
-            "a board is for a port; simulator has its own",
-        ),
-    ],
-)
-def test_a_source_and_a_board_that_do_not_go_together_are_reported(
-    call: Call, words: tuple[str, ...], text: str
-) -> None:
-    code, _, err = call(*words, "--model", "area.yaml")
+def test_a_recording_that_is_not_there_is_reported(call: Call) -> None:
+    code, _, err = call("none.ftr", "--model", "area.yaml")
+    text = "none.ftr is no recording; for a port, name its board"
     hint = "fuzzytree tactile live --help lists the options"
     assert (code, err) == (2, f"{text}\n  {hint}\n")
 
@@ -343,7 +326,7 @@ def ended(number: int, terminal: int) -> tuple[int, bytes]:
     return os.waitstatus_to_exitcode(os.waitpid(number, 0)[1]), rest
 
 
-FOREVER = ("simulator", "--model", "area.yaml")
+FOREVER = ("long.npz", "--model", "area.yaml")
 
 
 @pytest.mark.heavy
@@ -479,7 +462,7 @@ def test_the_commands_of_the_page_do_what_it_says(
     (board,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
     Path("mat.yaml").write_text(board, "utf-8")
     lines = "".join(re.findall(r"```console\n(.*?)```", page, re.DOTALL)).splitlines()
-    assert len(lines) == 6
+    assert len(lines) == 7
     with contextlib.ExitStack() as stack:
         for line in lines:
             program, *words = shlex.split(line)

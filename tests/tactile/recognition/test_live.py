@@ -13,7 +13,7 @@ import pytest
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.link.recording import FrameRecord
-from fuzzytree.tactile.recognition.frame_sources import Paced, simulated
+from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Hold, Live
 from fuzzytree.tactile.recognition.recogniser import State
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
@@ -180,11 +180,3 @@ def test_a_source_that_is_closed_gives_no_more_frames() -> None:
 def test_a_speed_below_zero_is_refused() -> None:
     with pytest.raises(ValueError, match=r"^a speed is 0 or more, not -1.0$"):
         Paced([], -1.0)
-
-
-def test_the_simulator_shows_the_same_presses_for_the_same_seed() -> None:
-    first, second = (list(itertools.islice(simulated(5), 90)) for _ in range(2))
-    for one, other in zip(first, second, strict=True):
-        assert np.array_equal(one.frame.cells, other.frame.cells)
-    assert first[40].frame.cells.max() > 100
-    assert first[88].frame.cells.max() <= 4
