@@ -10,11 +10,11 @@ import numpy as np
 from experiment_splits import Split
 from experiment_tables import EFFECTS
 from experiment_tasks import Task
+from press_physics import PAPER, press
+from press_physics import PhysicsSettings as Physics
+from press_shapes import OBJECTS
 
 from fuzzytree.learning import LearningSettings
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import PAPER, press
-from fuzzytree.tactile.simulation.physics import PhysicsSettings as Physics
 
 PRESSES = 50
 """Presses of each object to learn from, and as many others to test on (4.1, 3)."""

@@ -18,6 +18,14 @@ import msgspec
 import numpy as np
 from commands import run
 from press import physics_settings
+from press_physics import (
+    FULL,
+    PAPER,
+    SIDE,
+    PhysicsSettings,
+    press,
+)
+from press_shapes import OBJECTS
 
 from fuzzytree.cli.console import (
     ResultOptions,
@@ -32,14 +40,6 @@ from fuzzytree.cli.console import (
 )
 from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import (
-    FULL,
-    PAPER,
-    SIDE,
-    PhysicsSettings,
-    press,
-)
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray

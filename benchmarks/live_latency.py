@@ -25,6 +25,8 @@ from pathlib import Path
 
 import numpy as np
 from press import simulated
+from press_physics import press
+from press_shapes import OBJECTS
 from simulated_board import Wire, encoded
 
 from fuzzytree import table
@@ -37,8 +39,6 @@ from fuzzytree.tactile.link import open_connection
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.sensing import MOST_WAITING
 from fuzzytree.tactile.runtimes.frames import features_of
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import press
 
 FEATURES = (
     *("S1", "S2", "S7", "S8", "S9", "S11"),

@@ -16,6 +16,8 @@ from itertools import islice
 
 import msgspec
 import numpy as np
+from press_physics import PAPER, PhysicsSettings, press
+from press_shapes import OBJECTS
 
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import write_atomically
@@ -23,8 +25,6 @@ from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link.recording import FrameRecord, Recorder
 from fuzzytree.tactile.presses import Presses, presses_content
 from fuzzytree.tactile.sensor import FRAMES_A_SECOND, Counters, Frame
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import PAPER, PhysicsSettings, press
 
 _RISE, _STAY, _REST = 8, 64, 22  # frames of a press
 

@@ -33,6 +33,8 @@ from typing import assert_never
 import numpy as np
 import numpy.typing as npt
 from press import simulated
+from press_physics import FULL
+from press_shapes import OBJECTS
 
 from fuzzytree.errors import FuzzyTreeError, TableError, WriteError
 from fuzzytree.files import reason
@@ -51,8 +53,6 @@ from fuzzytree.tactile.cli.signals import stop_signal
 from fuzzytree.tactile.link.fixed import layout_of
 from fuzzytree.tactile.recognition.frame_sources import Replayed
 from fuzzytree.tactile.sensor import FRAMES_A_SECOND, Cells, check_frames
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import FULL
 
 if sys.platform != "win32":
     import termios

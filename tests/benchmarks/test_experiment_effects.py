@@ -11,9 +11,8 @@ from experiment_tables import (
     discriminate,
     effects,
 )
-
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import PAPER
+from press_physics import PAPER
+from press_shapes import OBJECTS
 
 ANGLED = tuple(name for name in OBJECTS if "-" in name)
 

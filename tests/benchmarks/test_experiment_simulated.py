@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from experiment_simulated import TABLE_3, paper_task
 from experiment_study import experiment
-
-from fuzzytree.tactile.simulation.objects import OBJECTS
+from press_shapes import OBJECTS
 
 
 def test_presses_to_learn_from_and_to_test_on_are_as_many_and_others() -> None:

@@ -13,14 +13,14 @@ from experiment_tables import (
     TableMeans,
     compare,
 )
-
-from fuzzytree.tactile.runtimes.frames import features_of
-from fuzzytree.tactile.simulation.objects import OBJECTS, FloatArray, Object, rectangle
-from fuzzytree.tactile.simulation.physics import (
+from press_physics import (
     PAPER,
     PhysicsSettings,
     press,
 )
+from press_shapes import OBJECTS, FloatArray, Object, rectangle
+
+from fuzzytree.tactile.runtimes.frames import features_of
 
 EVEN = msgspec.structs.replace(
     PAPER,

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import doctest
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import press as script
+import press_physics
+import press_shapes
 import pytest
 from press import main
+from press_physics import PAPER, PhysicsSettings, press
+from press_shapes import OBJECTS
 
 from fuzzytree.tactile.link.recording import read_recording
 from fuzzytree.tactile.presses import read_presses
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import PAPER, PhysicsSettings, press
 
 PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "simulator.md"
 
@@ -80,5 +83,6 @@ def test_the_documented_settings_are_those_that_there_are() -> None:
         assert stated[name] == (f"{value:g}" if not isinstance(value, str) else value)
 
 
-def test_the_examples_give_what_they_show() -> None:
-    assert doctest.testmod(script) == (0, 3)
+@pytest.mark.parametrize("module", [script, press_physics, press_shapes])
+def test_the_examples_give_what_they_show(module: ModuleType) -> None:
+    assert doctest.testmod(module).failed == 0

@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 
 import numpy as np
+from press_physics import press
+from press_shapes import OBJECTS
 
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
@@ -16,8 +18,6 @@ from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.names import names_of
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import press
 
 PLAIN = Sensor(16, 16, threshold=4)
 WIDE = Sensor(

@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import numpy.typing as npt
 import pytest
+from press_physics import press
+from press_shapes import OBJECTS
 
 from fuzzytree.tactile.link.recording import FrameRecord
 from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.recogniser import usual_floor
 from fuzzytree.tactile.sensor import Counters, Frame
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import press
 from tests.tactile.frame_models import pressed_tree
 
 Reading = npt.NDArray[np.float64]

@@ -7,6 +7,8 @@ import itertools
 import numpy as np
 import numpy.typing as npt
 import pytest
+from press_physics import press
+from press_shapes import OBJECTS
 
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
@@ -17,8 +19,6 @@ from fuzzytree.tactile.recognition.objects import Tracker, regions
 from fuzzytree.tactile.recognition.recogniser import State
 from fuzzytree.tactile.rest import RestEvent
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import press
 from tests.tactile.frame_models import pressed_tree
 
 

@@ -7,14 +7,14 @@ import functools
 import msgspec
 import numpy as np
 import pytest
+from press_physics import press
+from press_shapes import OBJECTS
 
 from fuzzytree.model import USUAL_FLOOR
 from fuzzytree.semantics import rules_from_tree
 from fuzzytree.tactile.cli.features import USUAL
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State, usual_floor
 from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import press
 from tests.tactile.frame_models import pressed_tree
 
 

@@ -15,11 +15,7 @@ from typing import Annotated, Literal, assert_never, get_args
 import numpy as np
 import numpy.typing as npt
 from msgspec import Meta
-
-from fuzzytree.errors import InvalidModelError
-from fuzzytree.model import Value
-from fuzzytree.tactile.sensor import Sensor, limit_mistakes
-from fuzzytree.tactile.simulation.objects import (
+from press_shapes import (
     OBJECTS,
     FloatArray,
     Object,
@@ -27,6 +23,10 @@ from fuzzytree.tactile.simulation.objects import (
     covered,
     radius_of,
 )
+
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.model import Value
+from fuzzytree.tactile.sensor import Sensor, limit_mistakes
 
 Wiring = Literal["diodes", "grounded", "floating"]
 

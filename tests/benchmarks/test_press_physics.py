@@ -9,21 +9,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 import pytest
-
-from fuzzytree.errors import InvalidModelError
-from fuzzytree.tactile.simulation.objects import (
-    OBJECTS,
-    FloatArray,
-    Object,
-    ShapePart,
-    area_and_middle,
-    covered,
-    disc,
-    finger,
-    radius_of,
-    rectangle,
-)
-from fuzzytree.tactile.simulation.physics import (
+from press_physics import (
     PAPER,
     SIDE,
     PhysicsSettings,
@@ -36,6 +22,20 @@ from fuzzytree.tactile.simulation.physics import (
     quantised,
     read_matrix,
 )
+from press_shapes import (
+    OBJECTS,
+    FloatArray,
+    Object,
+    ShapePart,
+    area_and_middle,
+    covered,
+    disc,
+    finger,
+    radius_of,
+    rectangle,
+)
+
+from fuzzytree.errors import InvalidModelError
 
 IDEAL = PhysicsSettings(
     aperture=1.0,

@@ -1,1 +1,0 @@
-"""Presses of our own: what a sensor would read when an object lies on it."""
