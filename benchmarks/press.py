@@ -90,7 +90,7 @@ def main(words: Sequence[str] | None = None) -> None:
     add("object", choices=[*OBJECTS, "all"])
     add("-o", dest="output", metavar="FILE", required=True, help=".npz or .ftr")
     add("--count", type=int, default=50, help="presses of each, in .npz; default 50")
-    add("--frames", type=int, default=658, help="in .ftr; default 658")
+    add("--frames", type=int, default=714, help="in .ftr; default 714: each once")
     add("--seed", type=int, default=0, help="of the presses; default 0")
     add("--set", dest="changes", metavar="NAME=VALUE", action="append", default=[])
     options = parser.parse_args(words)

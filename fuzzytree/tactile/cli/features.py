@@ -157,10 +157,10 @@ def _table(
 ) -> int:
     from fuzzytree.report import counted
     from fuzzytree.tactile.features.names import feature_of, has_unit
-    from fuzzytree.tactile.runtimes.frames import features_of
+    from fuzzytree.tactile.runtimes.frames import frame_features
 
     names = [*costs]
-    found = [features_of(part.sensor, part.frames, names) for part in parts]
+    found = [frame_features(part.sensor, part.frames, names) for part in parts]
     content = _csv(parts, found).encode()
     if output == "-":
         answer_bytes(content)

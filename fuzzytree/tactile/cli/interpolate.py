@@ -211,10 +211,10 @@ def _picture(
 def _axis(given: Presses, number: int) -> FrameAxis | None:
     """Return the centre and axis of a frame; None where nothing presses."""
     from fuzzytree.tactile.plots import FrameAxis
-    from fuzzytree.tactile.runtimes.frames import features_of
+    from fuzzytree.tactile.runtimes.frames import frame_features
 
     frame = given.frames[number]
-    found = features_of(given.sensor, frame, ["x", "y", "angle"])
+    found = frame_features(given.sensor, frame, ["x", "y", "angle"])
     if not found.is_pressed[0]:
         return None
     x, y, angle_deg = found.values[:, 0].tolist()

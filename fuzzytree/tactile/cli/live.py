@@ -21,7 +21,6 @@ from fuzzytree.cli import (
     takes,
     wrong_options,
 )
-from fuzzytree.tactile.cli.sensors import frames_model
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.recognition.live import Live, LiveResult
@@ -104,26 +103,23 @@ def command(options: TactileLiveOptions) -> int:
     keys t (tare), s and i; elsewhere there is a line for each object that is newly
     recognised. Ctrl-C ends. Exit 1 if --record ended before.
     """
-    from fuzzytree.tactile.recognition.recogniser import usual_floor
-    from fuzzytree.tactile.recognition.sensing import open_sensor
+    from fuzzytree.tactile.recognition.sensing import open as opened
     from fuzzytree.tactile.report.page import LivePage
 
     def tell(word: str, text: str) -> None:
         say_rows((word, text, ""), quiet=options.quiet)
 
-    known = frames_model(options.model)
-    floor = usual_floor(known) if options.reject is None else options.reject
     labels: Counter[str] = Counter()
     frames = 0
     with contextlib.ExitStack() as stack:
         stack.callback(sys.setswitchinterval, sys.getswitchinterval())
         sys.setswitchinterval(SWITCH_S)
         with wrong_options():
-            sensor = open_sensor(
+            sensor = opened(
                 options.source,
-                model=known,
+                model=options.model,
                 board=options.board,
-                reject=floor,
+                reject=options.reject,
                 vote_s=options.vote,
                 least_area=options.area,
                 record=options.record,
@@ -146,7 +142,7 @@ def command(options: TactileLiveOptions) -> int:
                     frames += 1
         except KeyboardInterrupt:
             pass
-    _report(live, labels, frames, floor, options)
+    _report(live, labels, frames, options)
     recorded = sensor.recorded
     if recorded is None or options.record is None:
         return 0
@@ -211,7 +207,6 @@ def _report(
     live: Live,
     labels: Counter[str],
     frames: int,
-    reject: float,
     options: TactileLiveOptions,
 ) -> None:
     """Say what was answered, how fast, and what was out of the ordinary."""
@@ -222,7 +217,9 @@ def _report(
     view, word = live.view(), STATES[State.UNKNOWN]
     found = [f"{visible(label)} {count}" for label, count in sorted(labels.items())]
     unknown = labels[word]
-    floor = f"no rule, or one below {reject:g}, decides; --reject sets it"
+    floor = (
+        f"no rule, or one below {live.recogniser.reject:g}, decides; --reject sets it"
+    )
     if options.vote:
         floor = f"{floor}; or the vote was not over"
     small = f"regions below {options.area} cells, no objects; --area sets it"

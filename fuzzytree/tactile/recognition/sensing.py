@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from fuzzytree.api import opened
+from fuzzytree.model import FuzzyTree, RuleBase
 from fuzzytree.tactile.board_file import load_board
 from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.link import Connection, open_connection, room, start
@@ -15,7 +17,7 @@ from fuzzytree.tactile.link.recording import Recorder
 from fuzzytree.tactile.recognition import frame_sources as sources
 from fuzzytree.tactile.recognition.live import Live, LiveResult
 from fuzzytree.tactile.recognition.objects import LEAST_AREA
-from fuzzytree.tactile.recognition.recogniser import usual_floor
+from fuzzytree.tactile.recognition.recogniser import checked_model, usual_floor
 
 if TYPE_CHECKING:
     from fuzzytree.files import PathLike
@@ -32,7 +34,7 @@ _PATIENCE_S = 2.0  # for a first frame
 class TactileSensor(contextlib.AbstractContextManager["TactileSensor"]):
     """A sensor and a model: iterating gives what each frame shows, as it comes.
 
-    `open_sensor` makes one. It must be closed: it is a context manager.
+    `fuzzytree.tactile.open` makes one. It must be closed: it is a context manager.
 
     Attributes:
         live: Recognition, which displays can look at.
@@ -100,10 +102,10 @@ class TactileSensor(contextlib.AbstractContextManager["TactileSensor"]):
         self.close()
 
 
-def open_sensor(
+def open(
     source: str,
     *,
-    model: Model,
+    model: Model | PathLike,
     board: Board | PathLike | None = None,
     reject: float | None = None,
     vote_s: float = 0.0,
@@ -112,23 +114,56 @@ def open_sensor(
     speed: float = 1.0,
     say: Callable[[str, str], None] | None = None,
 ) -> TactileSensor:
-    """Open a sensor, as `fuzzytree.tactile.open` describes, for a model that is read.
+    """Open a sensor: iterating gives what each frame shows, as it comes.
+
+    Each frame has its `time` in seconds, its `cells` (what presses on each, whole
+    numbers of shape (rows, columns), without the baseline) and its `objects`, the
+    largest force first, each with `label`, `strengths`, `probabilities`, `box`, `x`
+    and `y`. `tare()` takes what the cells read next for their baseline.
 
     Args:
-        source: As there.
-        model: A tree or a rule base whose inputs are names of features.
-        board: As there; so are all that follow but the last.
-        reject: The strength below which an object is unknown.
-        vote_s: How long the answers to an object vote.
+        source: A serial port, a recording, or an archive (.npz) or a table (.csv) of
+            frames.
+        model: A tree or a rule base whose inputs are names of features, or its file.
+        board: What is connected to the port, or sent the frames of an archive or a
+            table, or its file; none for a recording.
+        reject: The strength below which an object is unknown; the usual one if None.
+        vote_s: How many seconds the answers to an object vote; 0 for each frame's own.
         least_area: The fewest cells of an object.
         record: A recording to write every frame to.
-        speed: Of frames that are recorded.
+        speed: Of frames that are recorded; 0 for no pauses.
         say: Called with a word and a sentence on what is waited for.
 
+    Returns:
+        The sensor. It must be closed: it is a context manager.
+
     Raises:
-        FuzzyTreeError: As there.
-        ValueError: As there.
+        ValueError: If source and board do not go together, or a number is out of
+            range.
+        TableError: If the model's inputs are no features of frames.
+        PortError: If the port cannot be used, or frames stop before the baseline is
+            measured.
+        ReadError: If a file is none of its kind.
+        WriteError: If the recording cannot be made.
+
+    Example:
+        >>> import tempfile
+        >>> import numpy as np
+        >>> import fuzzytree as ft
+        >>> areas = np.array([[12.0], [18.0], [60.0], [70.0]])
+        >>> tree = ft.learn(
+        ...     ft.table(areas, columns=["area"]), target=["bar", "bar", "hand", "hand"]
+        ... )
+        >>> cells = np.zeros((1, 4, 6), np.uint8)
+        >>> cells[:, 1:, 2:] = 99
+        >>> path = tempfile.mkdtemp() + "/bar.npz"
+        >>> np.savez(path, frames=cells)
+        >>> with ft.tactile.open(path, model=tree) as sensor:
+        ...     frame = next(iter(sensor))
+        >>> frame.cells.shape, [thing.label for thing in frame.objects]
+        ((4, 6), ['bar'])
     """
+    known = _model(model)
     with contextlib.ExitStack() as stack:
         found, used, remarks = _source(source, board, record, speed, say)
         stack.callback(found.close)
@@ -141,11 +176,11 @@ def open_sensor(
                 found = sources.Newest(recorded, MOST_WAITING)
                 stack.callback(found.close)
         live = Live(
-            model,
+            known,
             used.sensor,
             found,
             source,
-            reject=usual_floor(model) if reject is None else reject,
+            reject=usual_floor(known) if reject is None else reject,
             follow_s=used.start.follow_s,
             calibration=used.calibration,
             vote_s=vote_s,
@@ -153,6 +188,12 @@ def open_sensor(
         )
         return TactileSensor(live, used, remarks, recorded, stack.pop_all())
     raise AssertionError  # an exit stack swallows nothing
+
+
+def _model(model: Model | PathLike) -> Model:
+    if isinstance(model, FuzzyTree | RuleBase):
+        return model
+    return checked_model(opened(model), os.fspath(model))
 
 
 def _source(

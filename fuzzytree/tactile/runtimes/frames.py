@@ -14,6 +14,7 @@ import numpy as np
 
 from fuzzytree.runtimes import ProgramPlan, plan_program, row_runner, run_program
 from fuzzytree.tactile.features import FrameProgram, frame_program
+from fuzzytree.tactile.features.names import names_of
 from fuzzytree.tactile.sensor import Cells, Sensor, check_frames, pressed
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ class FramePlan:
                 place += 1
 
 
-def features_of(sensor: Sensor, frames: Cells, names: Sequence[str]) -> Features:
+def frame_features(sensor: Sensor, frames: Cells, names: Sequence[str]) -> Features:
     """Return features of frames, whole numbers of shape (frames, rows, columns).
 
     Raises:
@@ -104,7 +105,33 @@ def features_of(sensor: Sensor, frames: Cells, names: Sequence[str]) -> Features
     Example:
         >>> bar = np.zeros((1, 5, 5), np.uint8)
         >>> bar[0, 2, 1:4] = 255
-        >>> features_of(Sensor(5, 5), bar, ["S1", "angle"]).values.tolist()
+        >>> frame_features(Sensor(5, 5), bar, ["S1", "angle"]).values.tolist()
         [[2.0], [0.0]]
     """
     return FramePlan(sensor, names)(frames)
+
+
+def features_of(frames: Cells, names: str, sensor: Sensor | None = None) -> FloatArray:
+    """Return features of frames as scikit-learn wants them: (frames, features).
+
+    Args:
+        frames: Whole numbers of shape (frames, rows, columns), or one frame.
+        names: Features and sets of features, with commas between them, such as
+            `log orientation / force`.
+        sensor: Whose frames they are; if None, one without a baseline, whose cells
+            read at most 255 (65535 for numbers of 16 bits).
+
+    Raises:
+        TableError: If a name is no feature's, or the frames do not fit.
+        InvalidModelError: If sums for a feature are beyond what doubles hold exactly.
+
+    Example:
+        >>> features_of(np.full((1, 2, 3), 255, np.uint8), "force, area").tolist()
+        [[6.0, 6.0]]
+    """
+    if sensor is None:
+        found = np.asarray(frames)
+        full = 255 if found.dtype.itemsize == 1 else 65535
+        rows, columns = found.shape[-2:]
+        sensor = Sensor(rows, columns, full)
+    return FramePlan(sensor, names_of(names))(frames).values.T
