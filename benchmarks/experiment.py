@@ -39,7 +39,6 @@ from fuzzytree.files import write_atomically
 from fuzzytree.learning import LearningSettings
 
 _FRAMES_SHOWN = 7
-_TIMES = (1, 3, 5, 7)
 """Points for a cell in the pictures, as in the paper's Fig. 6."""
 
 
@@ -275,9 +274,7 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
     from figures import drawn
 
     from fuzzytree.report.svg_tree import MOST_LEAVES, draw_tree
-    from fuzzytree.tactile.interpolation import interpolated
     from fuzzytree.tactile.plots import draw_frames
-    from fuzzytree.tactile.sensor import pressed
 
     found: dict[str, bytes] = {}
     study = outcome.study
@@ -294,14 +291,8 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
         counts = np.hstack([table[:, :count], none]) if none.any() else table[:, :count]
         found["confusion.svg"] = drawn(draw_confusion(counts, study.classes))
     first = [int(np.argmax(task.codes == code)) for code in range(len(study.classes))]
-    cells = pressed(task.sensor, task.frames[first[:_FRAMES_SHOWN]])
-    shown = [interpolated(one, times) for times in _TIMES for one in cells]
-    titles = [
-        f"{name}, {times} times" if times > 1 else name
-        for times in _TIMES
-        for name in study.classes[: len(cells)]
-    ]
-    frames = draw_frames(shown, titles=titles, columns=len(cells))
+    shown, names = task.frames[first[:_FRAMES_SHOWN]], study.classes[:_FRAMES_SHOWN]
+    frames = draw_frames(task.sensor, shown, names)
     found["frames.svg"] = frames.content(".svg")
     return found
 

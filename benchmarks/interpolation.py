@@ -21,9 +21,9 @@ import numpy.typing as npt
 from figures import SIZE, drawn, style
 
 from fuzzytree.tactile.interpolation import interpolated
-from fuzzytree.tactile.plots import COLOURS, draw_frames
+from fuzzytree.tactile.plots import draw_frames
 from fuzzytree.tactile.presses import read_frames
-from fuzzytree.tactile.sensor import pressed
+from fuzzytree.tactile.report.live import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,6 +41,7 @@ SIDE = 16
 FIELDS = 200
 MOST = 0.1  # the end of the scale of differences
 _PANEL = 1.75  # inches
+_COLOURS = ((255, 255, 255), *PALETTE[235:8:-1])  # white for nothing, dark for much
 
 
 def main() -> None:
@@ -96,7 +97,7 @@ def picture_of_weights() -> Figure:
         strong = {
             "vmin": 0.0,
             "vmax": 1.0,
-            "cmap": ListedColormap(np.divide(COLOURS, 255)),
+            "cmap": ListedColormap(np.divide(_COLOURS, 255)),
         }
         _show(first, fuzzy, "fuzzy", levels, strong)
         _show(second, plain, "bilinear", levels, strong)
@@ -159,13 +160,8 @@ def _draw_profiles(axes: Axes, fuzzy: Floats, plain: Floats, times: int) -> None
 def picture_of_a_hand() -> Picture:
     """Draw a press of a hand at each number of times (paper, Fig. 6)."""
     given = read_frames(HAND, threshold=6)
-    cells = pressed(given.sensor, given.frames)[0]
-    return draw_frames(
-        [cells, *(interpolated(cells, times) for times in TIMES)],
-        titles=["16 x 16 cells", *(f"{times} times" for times in TIMES)],
-        title="One press of a hand, interpolated",
-        unit="reading",
-    )
+    title = "One press of a hand, interpolated"
+    return draw_frames(given.sensor, given.frames, [title])
 
 
 def fields(width: float) -> Iterator[Callable[[Floats, Floats], Floats]]:

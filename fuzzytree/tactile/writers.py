@@ -1,4 +1,4 @@
-"""Frames as files of other programs: tables, arrays, pictures that move."""
+"""Frames as files of other programs: tables, arrays and pictures."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ from fuzzytree.errors import MissingExtraError, WriteError, install_hint
 from fuzzytree.files import PathLike, open_atomically, write_atomically
 from fuzzytree.tactile.board_file import board_text
 from fuzzytree.tactile.link.recording import FrameFile, Recording, write_recording
+from fuzzytree.tactile.plots import draw_frames
 from fuzzytree.tactile.presses import packed_arrays
 from fuzzytree.tactile.report.live import PALETTE, shades
+from fuzzytree.tactile.rest import Rest
 from fuzzytree.tactile.sensor import FRAMES_A_SECOND, Sensor, pressed
 
 if TYPE_CHECKING:
@@ -103,6 +105,31 @@ def write_hdf5(path: PathLike, file: FrameFile) -> None:
             root.attrs["baseline"] = np.array(sensor.baseline, kind).reshape(shape)
         if sensor.masked:
             root.attrs["masked"] = np.array(sensor.masked, np.uint8)
+
+
+def write_picture(path: PathLike, file: FrameFile, number: int | None = None) -> None:
+    """Write what presses in a frame as SVG or PNG, also interpolated.
+
+    Args:
+        path: The picture; its name ends in .svg or .png.
+        file: The frames.
+        number: Of the frame, from 0; the first in which something presses if None.
+
+    Raises:
+        MissingExtraError: If a PNG is wanted and the extra is not installed.
+        WriteError: If there is no such frame.
+    """
+    shown = None
+    for place, (frame, _counters) in islice(enumerate(file), number or 0, None):
+        rest = Rest(file.sensor, 0.0, file.board.calibration)
+        shown = place, rest.bare, rest(frame.cells, frame.time)
+        if number is not None or shown[2].any():
+            break
+    if shown is None:
+        raise WriteError(f"{path}: cannot be written: there is no frame")
+    place, sensor, cells = shown
+    title = f"{Path(path).stem}, frame {place}"
+    draw_frames(sensor, cells[np.newaxis], [title]).save(path)
 
 
 def write_gif(path: PathLike, file: FrameFile) -> None:
@@ -198,7 +225,7 @@ def _pictures(
                 continue
             at, ticks = now, min(now - at, _MOST_TICKS)
             yield shades(shown, sensor.full, times), ticks
-        shown = pressed(sensor, frame.cells)[0]
+        shown = pressed(file.sensor, frame.cells)[0]
     if shown is None:
         raise WriteError(f"{path}: cannot be written: there is no frame")
     yield shades(shown, sensor.full, times), ticks
@@ -231,15 +258,17 @@ def _copied(path: PathLike, name: str) -> Generator[Path]:
             shutil.copyfileobj(content, output)
 
 
-WRITERS: Mapping[str, Callable[[PathLike, FrameFile], None]] = MappingProxyType(
+WRITERS: Mapping[str, Callable[..., None]] = MappingProxyType(
     {
         ".ftr": write_recording,
         ".csv": write_table,
         ".npz": write_arrays,
         ".h5": write_hdf5,
+        ".svg": write_picture,
+        ".png": write_picture,
         ".gif": write_gif,
         ".mp4": write_mp4,
         ".yaml": write_board,
     }
 )
-"""What writes a file, by the end of its name."""
+"""What writes a path and frames, by the end of its name."""

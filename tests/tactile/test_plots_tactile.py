@@ -20,7 +20,10 @@ import pytest
 from confusion import draw_confusion
 from figures import drawn
 
-from fuzzytree.tactile.plots import COLOURS, MOST_FRAMES, FrameAxis, draw_frames
+from fuzzytree.tactile.interpolation import interpolated
+from fuzzytree.tactile.plots import TIMES, draw_frames
+from fuzzytree.tactile.report.live import PALETTE
+from fuzzytree.tactile.sensor import Sensor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +38,8 @@ DRAWN_BY = "3.11.2"
 SCRIPT = "python benchmarks/interpolation.py --draw"
 SVG = "{http://www.w3.org/2000/svg}"
 
-FRAME = np.array([[0, 4], [8, 2]])
+SENSOR = Sensor(2, 2)
+FRAME = np.array([[[0, 4], [8, 2]]])
 
 
 def words(figure: Figure) -> list[Text]:
@@ -77,88 +81,78 @@ def dots(image: Any) -> npt.NDArray[np.int64]:
     return colours[lines[:, 1:]]
 
 
-def first_dots(picture: Picture) -> npt.NDArray[np.int64]:
-    return dots(groups(picture)[0].find(f"{SVG}image"))
+def drawn_dots(picture: Picture) -> list[npt.NDArray[np.int64]]:
+    """Return the colours of all frames, without the scale."""
+    return [dots(one.find(f"{SVG}image")) for one in groups(picture)[:-1]]
 
 
-def test_every_dot_of_a_frame_has_the_colour_of_its_cell() -> None:
-    found = first_dots(draw_frames([FRAME]))
-    side = found.shape[0] // 2
-    for (row, column), value in np.ndenumerate(FRAME):
-        cell = found[row * side : (row + 1) * side, column * side : (column + 1) * side]
-        wanted = COLOURS[int(np.ceil(value / 8.0 * (len(COLOURS) - 1)))]
-        assert (cell == wanted).all()
+def test_every_dot_has_the_colour_of_its_share_of_the_largest() -> None:
+    found = drawn_dots(draw_frames(SENSOR, FRAME, ["a"]))
+    assert len(found) == len(TIMES)
+    for times, colours in zip(TIMES, found, strict=True):
+        shares = np.rint(255 * interpolated(FRAME[0], times) / 8).astype(int)
+        assert (colours == np.array(PALETTE)[shares]).all()
 
 
-def test_colours_of_pressure_grow_evenly_darker() -> None:
-    rgb = np.asarray(COLOURS[1:]) / 255.0
+def test_colours_of_pressure_grow_evenly_lighter() -> None:
+    rgb = np.asarray(PALETTE) / 255.0
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     lightness = np.cbrt(linear @ [0.2126, 0.7152, 0.0722])
-    assert (np.diff(lightness[::8]) < 0.0).all()
-    assert lightness[0] > 0.9
-    assert lightness[-1] < 0.3
+    assert (np.diff(lightness[::8]) > 0.0).all()
 
 
 def test_all_frames_share_the_scale_of_the_largest() -> None:
-    picture = draw_frames([FRAME, FRAME * 3])
+    both = np.concatenate([FRAME, FRAME * 3])
+    picture = draw_frames(SENSOR, both, ["a", "b"])
     *_, scale = groups(picture)
     numbers = [one.text for one in scale.iter(f"{SVG}text")]
-    assert numbers == ["0", "5", "10", "15", "20", "pressure"]
-    assert (first_dots(draw_frames([FRAME, FRAME])) != first_dots(picture)).any()
+    assert numbers == ["0", "5", "10", "15", "20", "reading"]
+    alone = draw_frames(SENSOR, FRAME, ["a"])
+    assert (drawn_dots(alone)[0] != drawn_dots(picture)[0]).any()
 
 
-def test_a_frame_without_pressure_is_white() -> None:
-    assert (first_dots(draw_frames([np.zeros((3, 4))])) == 255).all()
+def test_the_scale_of_a_calibrated_sensor_has_its_unit() -> None:
+    sensor = Sensor(2, 2, 16, top=40.0, unit="kPa")
+    *_, scale = groups(draw_frames(sensor, FRAME, ["a"]))
+    numbers = [one.text for one in scale.iter(f"{SVG}text")]
+    assert numbers == ["0", "5", "10", "15", "20", "kPa"]
+
+
+def test_a_frame_without_pressure_has_one_colour_and_no_centre() -> None:
+    picture = draw_frames(Sensor(3, 4), np.zeros((1, 3, 4), int), ["a"])
+    assert (drawn_dots(picture)[0] == PALETTE[0]).all()
+    assert 'class="centre"' not in picture.svg
 
 
 def test_the_centre_of_pressure_lies_where_the_features_say() -> None:
-    one = FrameAxis(x=0.5, y=-0.5, angle_deg=90.0, length=1.0)
-    picture = draw_frames([np.ones((6, 6))], axes=[one], cells=[(2, 2)])
-    parts = {part.attrib.get("class"): part.attrib for part in groups(picture)[0]}
-    # A frame is 150 points wide, and the centre in the lower right of 2 x 2 cells.
-    assert (parts["centre"]["x"], parts["centre"]["y"]) == ("109", "109")
-    line = [float(parts["axis"][name]) for name in ("x1", "x2", "y1", "y2")]
-    assert line == pytest.approx([112.5, 112.5, 187.5, 37.5])
+    cells = np.zeros((1, 10, 10), int)
+    cells[0, 6:10, 7] = 9
+    parts = [
+        {part.attrib.get("class"): part.attrib for part in one}
+        for one in groups(draw_frames(Sensor(10, 10), cells, ["a"]))[:-1]
+    ]
+    for part in parts:  # a cell is 15 points wide, and the centre 7 points
+        assert (part["centre"]["x"], part["centre"]["y"]) == ("109", "116.5")
+        line = [float(part["axis"][name]) for name in ("x1", "x2", "y1", "y2")]
+        assert line == pytest.approx([112.5, 112.5, 150.0, 90.0])
 
 
-def test_frames_of_any_shape_keep_square_cells() -> None:
-    shapes = [(4, 8), (8, 2), (1, 300)]
-    drawn = groups(draw_frames([np.ones(shape) for shape in shapes]))
-    for one, (rows, columns) in zip(drawn, shapes[:2], strict=False):
-        box = one.find(f"{SVG}image").attrib
-        sides = float(box["width"]) / columns, float(box["height"]) / rows
-        assert sides[0] == pytest.approx(sides[1], rel=0.01)
+@pytest.mark.parametrize("shape", [(4, 8), (8, 2), (1, 256)])
+def test_frames_of_any_shape_keep_square_cells(shape: tuple[int, int]) -> None:
+    rows, columns = shape
+    picture = draw_frames(Sensor(rows, columns), np.ones((1, *shape), int), ["a"])
+    box = groups(picture)[0].find(f"{SVG}image").attrib
+    assert float(box["width"]) == pytest.approx(150.0 * columns / max(shape), rel=0.01)
+    assert float(box["height"]) == max(150.0 * rows / max(shape), 8.0)
 
 
-def test_titles_stand_above_their_frames_and_stay_within_the_picture() -> None:
-    picture = draw_frames([FRAME] * 5, titles=list("abcde"), title="five")
-    titles = [one.find(f"{SVG}text").text for one in groups(picture)[:5]]
-    assert titles == list("abcde")
-    assert ">five</text>" in picture.svg
-    long = draw_frames(
-        [FRAME, FRAME], titles=["wide <name> " * 50, "b"], title="x" * 99
-    )
-    assert "…</text>" in long.svg
-    assert (
-        max(len(one.text or "") for one in ET.fromstring(long.svg).iter(f"{SVG}text"))
-        < 60
-    )
-
-
-@pytest.mark.parametrize(
-    ("frames", "options", "text"),
-    [
-        ([], {}, f"a picture has 1 to {MOST_FRAMES} frames, not 0"),
-        ([FRAME, FRAME[0]], {}, "frame 2 of shape (2,) is no matrix of finite numbers"),
-        ([FRAME], {"titles": ["a", "b"]}, "2 titles for 1 frames"),
-    ],
-)
-def test_frames_that_are_none_are_refused(
-    frames: list[npt.NDArray[Any]], options: dict[str, Any], text: str
-) -> None:
-    with pytest.raises(ValueError, match=r".") as caught:
-        draw_frames(frames, **options)
-    assert str(caught.value) == text
+def test_titles_stay_within_the_picture() -> None:
+    both = np.concatenate([FRAME, FRAME])
+    found = draw_frames(SENSOR, both, ["wide <name> " * 50, "b"]).svg
+    assert "…</text>" in found
+    assert ">b</text>" in found
+    letters = [len(one.text or "") for one in ET.fromstring(found).iter(f"{SVG}text")]
+    assert max(letters) < 92
 
 
 def test_a_confusion_shows_counts_rates_and_the_whole() -> None:
@@ -213,9 +207,7 @@ def test_the_same_pictures_are_the_same_bytes_whatever_a_users_settings() -> Non
     plain = drawn(draw_confusion(table, ["a", "b"]))
     with mpl.rc_context({"font.size": 20, "axes.grid": True, "image.origin": "lower"}):
         assert drawn(draw_confusion(table, ["a", "b"])) == plain
-    frames = [FRAME, FRAME]
-    axes = [None, FrameAxis(0.0, 0.0, 45.0)]
-    assert draw_frames(frames, axes=axes) == draw_frames(frames, axes=axes)
+    assert draw_frames(SENSOR, FRAME, ["a"]) == draw_frames(SENSOR, FRAME, ["a"])
 
 
 def test_the_pictures_of_the_docs_are_those_of_their_script() -> None:

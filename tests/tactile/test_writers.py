@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gc
+import re
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +14,25 @@ import cv2
 import h5py
 import numpy as np
 import pytest
+from msgspec import structs
 from numpy.testing import assert_allclose
 from PIL import Image, ImageSequence
 
 from fuzzytree.errors import MissingExtraError, WriteError, install_hint
 from fuzzytree.tactile.board_file import read_board
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.link.recording import Recording
+from fuzzytree.tactile.calibration import Calibration
+from fuzzytree.tactile.link.recording import Recorder, Recording, RecordingFile
+from fuzzytree.tactile.plots import draw_frames
 from fuzzytree.tactile.report.live import PALETTE, shades
-from fuzzytree.tactile.sensor import Counters, Sensor, pressed
-from fuzzytree.tactile.writers import WRITERS, write_gif, write_hdf5, write_mp4
+from fuzzytree.tactile.sensor import Counters, Frame, Sensor, pressed
+from fuzzytree.tactile.writers import (
+    WRITERS,
+    write_gif,
+    write_hdf5,
+    write_mp4,
+    write_picture,
+)
 
 SENSOR = Sensor(4, 6, 255, 3, baseline=(5,) * 24, masked=((0, 1), (3, 5)))
 LOST = 12
@@ -84,6 +95,50 @@ def test_hdf5_has_the_numbers_and_the_board(tmp_path: Path, sensor: Sensor) -> N
     assert read_board(facts["board"].encode(), "a.yaml").sensor == sensor
     masked = facts["masked"].tolist() if "masked" in facts else []
     assert masked == [[*cell] for cell in sensor.masked]
+
+
+def test_a_picture_is_of_the_first_frame_that_something_presses_on(
+    tmp_path: Path,
+) -> None:
+    file = recording([0.0, 0.1, 0.2])
+    file.frames[:2] = 5  # the baseline
+    titles: list[str] = []
+    for number in (None, 0, 2):
+        write_picture(tmp_path / "a.svg", file, number)
+        found = (tmp_path / "a.svg").read_text("utf-8")
+        titles += re.findall('class="strong">(.*?)<', found)
+        assert (">0</text>" in found, "reading" in found) == (True, True)
+        assert ('class="centre"' in found) == (number != 0)
+    assert titles == ["a, frame 2", "a, frame 0", "a, frame 2"]
+
+
+def test_a_picture_of_a_calibrated_board_shows_its_unit(tmp_path: Path) -> None:
+    file = recording([0.0], Sensor(4, 6, 250))
+    law = Calibration("kPa", ((100.0, 2.0), (200.0, 6.0)))
+    board = structs.replace(file.board, calibration=law)
+    write_picture(tmp_path / "a.svg", replace(file, board=board))
+    words = re.findall(">([^<>]+)</text>", (tmp_path / "a.svg").read_text("utf-8"))
+    assert words[-6:] == ["0", "2", "4", "6", "8", "kPa"]  # 250 reads 8 kPa
+
+
+def test_pictures_take_the_baseline_of_the_last_tare(tmp_path: Path) -> None:
+    board = Board("mat", Sensor(2, 3), Marker("AA 55"))
+    cells = np.array([[9, 9, 9], [9, 9, 80]])
+    with Recorder(tmp_path / "a.ftr", board) as recorder:
+        for number in range(2):
+            frame = Frame(cells, float(number), number)
+            recorder.write(frame, Counters())
+            baseline = Sensor(2, 3, baseline=(9,) * 6)
+            recorder.write_rest(baseline, frame, Counters())
+    with RecordingFile(tmp_path / "a.ftr") as file:
+        for number in range(2):
+            write_picture(tmp_path / "a.svg", file, number)
+            pressing = (cells - 9 * number)[None]
+            wanted = draw_frames(Sensor(2, 3), pressing, [f"a, frame {number}"])
+            assert (tmp_path / "a.svg").read_text("utf-8") == wanted.svg
+        write_gif(tmp_path / "a.gif", file)
+    darkest = [picture.sum(axis=2).min() for picture in gif(tmp_path / "a.gif")[0]]
+    assert darkest[0] > darkest[1] == sum(PALETTE[0])
 
 
 def test_a_gif_has_every_colour_and_the_recorded_times(tmp_path: Path) -> None:
@@ -150,13 +205,13 @@ def test_frames_that_come_too_fast_are_left_out_and_keep_their_times(
 @pytest.mark.parametrize("suffix", sorted({*WRITERS} - {".ftr"}))
 def test_the_same_frames_give_the_same_bytes(tmp_path: Path, suffix: str) -> None:
     contents = []
-    for name in ("a", "b"):
-        WRITERS[suffix](tmp_path / f"{name}{suffix}", recording([0.0, 0.1, 0.2]))
-        contents.append((tmp_path / f"{name}{suffix}").read_bytes())
+    for _ in range(2):
+        WRITERS[suffix](tmp_path / f"a{suffix}", recording([0.0, 0.1, 0.2]))
+        contents.append((tmp_path / f"a{suffix}").read_bytes())
     assert contents[0] == contents[1]
 
 
-@pytest.mark.parametrize("suffix", [".gif", ".mp4"])
+@pytest.mark.parametrize("suffix", [".svg", ".png", ".gif", ".mp4"])
 def test_without_a_frame_there_is_no_picture(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a{suffix}"
     with pytest.raises(WriteError) as caught:
@@ -182,6 +237,7 @@ def test_an_encoder_that_fails_leaves_no_file(
 @pytest.mark.parametrize(
     ("suffix", "module", "what", "extra"),
     [
+        (".png", "resvg_py", "a PNG", "plots"),
         (".h5", "h5py", "HDF5", "hdf5"),
         (".gif", "PIL", "a GIF", "video"),
         (".mp4", "imageio_ffmpeg", "an MP4", "video"),

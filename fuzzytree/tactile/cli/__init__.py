@@ -10,7 +10,7 @@ from fuzzytree.cli import Verbs
 
 ACTIONS = (
     *("ports", "record", "replay", "calibrate", "live"),
-    *("features", "interpolate", "export", "check"),
+    *("features", "export", "check"),
 )
 """Each action is the `command` of the module `fuzzytree.tactile.cli.ACTION`."""
 

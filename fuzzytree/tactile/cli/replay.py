@@ -33,7 +33,12 @@ class TactileReplayOptions(ResultOptions):
     output: str | None = option(
         "-o --output FILE",
         "File for the frames (.ftr, .csv, .npz, .h5), for pictures of them (.gif, "
-        ".mp4) or for the board (.yaml).",
+        ".mp4), for one of a frame (.svg, .png) or for the board (.yaml).",
+    )
+    frame: int | None = option(
+        "--frame N",
+        "Frame of the picture, from 0; the first in which something presses if none.",
+        type=click.IntRange(0),
     )
     board: str | None = option(
         "--board BOARD.yaml", "File of the board that sent the frames of .npz or .csv."
@@ -49,6 +54,7 @@ def command(options: TactileReplayOptions) -> None:
     recording of these. Without times there are 44 frames a second, and without --board
     a plain board.
     """
+    from fuzzytree.report import SUFFIXES, counted
     from fuzzytree.tactile.board_file import load_board
     from fuzzytree.tactile.link.recording import review
     from fuzzytree.tactile.presses import open_frames
@@ -60,16 +66,23 @@ def command(options: TactileReplayOptions) -> None:
         if suffix not in WRITERS:
             known = ", ".join(WRITERS)
             raise click.UsageError(f"-o writes {known}, not {options.output}")
+    chosen = () if options.frame is None else (options.frame,)
+    if chosen and suffix not in SUFFIXES:
+        known = " or ".join(SUFFIXES)
+        raise click.UsageError(f"--frame needs a picture of one frame: -o with {known}")
     board = None if options.board is None else load_board(options.board)
     with open_frames(options.frames, board) as file:
         found = review(file)
+        if chosen and found.frames <= chosen[0]:
+            known = f"{options.frames} has {counted(found.frames, 'frame')}"
+            raise click.UsageError(f"--frame {chosen[0]}: {known}, numbered from 0")
         if options.as_json:
             facts = {"board": file.board, "started": _started(file)}
             answer_json({**facts, **asdict(found)})
         else:
             answer("\n".join(_lines(options.frames, file, found)))
         if options.output is not None:
-            WRITERS[suffix](options.output, file)
+            WRITERS[suffix](options.output, file, *chosen)
             sensor = file.board.sensor
             rests = any(sensor.baseline) or bool(sensor.masked)
             is_bare = suffix in (".csv", ".npz") and rests

@@ -351,6 +351,12 @@ def test_a_recording_becomes_a_picture_that_moves(call: Call, place: Path) -> No
     assert Path("a.GIF").read_bytes().startswith(b"GIF89a")
 
 
+def test_a_frame_becomes_a_picture(call: Call, place: Path) -> None:
+    words = ("tactile", "replay", "a.ftr", "--frame", "3", "-o", "a.svg")
+    assert call(*words)[2] == "wrote    a.svg\n"
+    assert ">a, frame 3</text>" in Path("a.svg").read_text("utf-8")
+
+
 def test_the_board_of_a_recording_becomes_its_file(call: Call, place: Path) -> None:
     assert call("tactile", "replay", "a.ftr", "-o", "b.yaml")[0] == 0
     assert load_board("b.yaml") == BOARD
@@ -361,7 +367,15 @@ def test_the_board_of_a_recording_becomes_its_file(call: Call, place: Path) -> N
     [
         (
             ("a.ftr", "-o", "a.txt"),
-            "-o writes .ftr, .csv, .npz, .h5, .gif, .mp4, .yaml, not a.txt",
+            "-o writes .ftr, .csv, .npz, .h5, .svg, .png, .gif, .mp4, .yaml, not a.txt",
+        ),
+        (
+            ("a.ftr", "--frame", "2", "-o", "a.gif"),
+            "--frame needs a picture of one frame: -o with .svg or .png",
+        ),
+        (
+            ("a.ftr", "--frame", "6", "-o", "a.svg"),
+            "--frame 6: a.ftr has 6 frames, numbered from 0",
         ),
         (("a.ftr", "-o", "./a.ftr"), "./a.ftr: cannot be written: it is read as well"),
         (
