@@ -16,7 +16,8 @@ from experiment_splits import Split, check_apart, leave_one_out
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.files import PathLike, read_bounded
 from fuzzytree.learning import LearningSettings
-from fuzzytree.tactile.presses import LIMIT, Presses, read_presses
+from fuzzytree.tactile.link.recording import Recording
+from fuzzytree.tactile.presses import LIMIT, labelled, read_frames
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 if TYPE_CHECKING:
@@ -181,7 +182,7 @@ def known_task(name: str, folder: PathLike | None = None) -> Task:
             f"{path}: is not the file that belongs to {name!r}: its SHA-256 is "
             f"{found}, not {known.sha256}"
         )
-    presses = read_presses(path, label=known.label)
+    presses = read_frames(path, label=known.label)
     if known.others:
         first = presses.label_names[0]
         label = np.minimum(presses.label, 1)
@@ -195,7 +196,7 @@ def known_task(name: str, folder: PathLike | None = None) -> Task:
 
 def by_subject(
     name: str,
-    presses: Presses,
+    presses: Recording,
     sensor: Sensor,
     about: str,
     features: str = SHAPES,
@@ -254,20 +255,20 @@ def file_task(
         InvalidModelError: If `full` and `threshold` are out of their range.
     """
     name = os.fspath(path)
-    presses = read_presses(path, label=label)
+    presses = read_frames(path, label=label)
     own = presses.sensor
     least = own.threshold if threshold is None else threshold
     sensor = _sensor(presses, own.full if full is None else full, least)
     if test is None:
         return by_subject(name, presses, sensor, f"{len(presses.frames)} frames")
-    other, title = read_presses(test, label=label), os.fspath(test)
+    other, title = read_frames(test, label=label), os.fspath(test)
     check_apart(presses.subject, other.subject, (name, title))
     if other.frames.shape[1:] != presses.frames.shape[1:]:
         raise TableError(f"{title}: has frames of another size than {name}")
     if other.label_names != presses.label_names:
         raise TableError(f"{title}: has other classes than {name}")
     count = len(presses.frames)
-    both = Presses(
+    both = labelled(
         np.concatenate([presses.frames, other.frames]),
         sensor,
         np.concatenate([presses.label, other.label]),
@@ -291,12 +292,12 @@ def file_task(
     )
 
 
-def _sensor(presses: Presses, full: int, threshold: int) -> Sensor:
+def _sensor(presses: Recording, full: int, threshold: int) -> Sensor:
     rows, columns = presses.frames.shape[1:]
     return Sensor(rows, columns, full=full, threshold=threshold)
 
 
-def _classes(presses: Presses, name: str) -> tuple[IntArray, tuple[str, ...]]:
+def _classes(presses: Recording, name: str) -> tuple[IntArray, tuple[str, ...]]:
     """Return the codes and names of the classes that occur.
 
     Raises:

@@ -159,7 +159,7 @@ def _draw_profiles(axes: Axes, fuzzy: Floats, plain: Floats, times: int) -> None
 
 def picture_of_a_hand() -> Picture:
     """Draw a press of a hand at each number of times (paper, Fig. 6)."""
-    given = read_frames(HAND, threshold=6)
+    given = read_frames(HAND)
     title = "One press of a hand, interpolated"
     return draw_frames(given.sensor, given.frames, [title])
 

@@ -116,7 +116,7 @@ def _axis(sensor: Sensor, x: float, y: float, angle_deg: float) -> Iterator[Mark
 
 def _scale(full: float, unit: str, high: float) -> Iterator[Markup]:
     """Yield the scale of colours with its numbers."""
-    yield from _image(np.arange(255, -1, -1, np.uint8)[:, None], 0, 0, 10, high)
+    yield from _image(np.arange(255, -1, -1).astype(np.uint8)[:, None], 0, 0, 10, high)
     values = ticks(0.0, full, 5)
     for value, word in zip(values, tick_words(values), strict=True):
         yield mark("words", 14, high * (1.0 - value / full) + 4, word, "small")

@@ -24,34 +24,31 @@ import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec import structs
 
 from fuzzytree.csv_rows import BLOCK, CsvRows, blocks
 from fuzzytree.errors import InvalidModelError, ReadError, TableError
 from fuzzytree.files import PathLike, check_stream, read_bounded, reason
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.link.recording import (
-    MAGIC,
-    FrameFile,
-    Recording,
-    RecordingFile,
-    read_recording,
-)
+from fuzzytree.tactile.link.recording import FrameFile, Recording, RecordingFile
 from fuzzytree.tactile.sensor import (
     FRAMES_A_SECOND,
     LARGEST_SIDE,
     Cells,
     Counters,
     Sensor,
+    check_frames,
 )
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    Numbers = Sequence[int] | npt.NDArray[np.int64 | np.float64]
 
 LIMIT = 2**30
 """The most bytes of an archive, packed or not, or of a table."""
@@ -77,70 +74,37 @@ _MOST = {"time": 2**33, "number": 2**53 - 1}
 """Seconds that fit a recording's nanoseconds, and whole numbers that a float keeps."""
 
 
-def _no_times() -> npt.NDArray[np.float64]:
-    return np.zeros(0, np.float64)
+def labelled(
+    frames: Cells,
+    sensor: Sensor,
+    label: Numbers = (),
+    label_names: tuple[str, ...] = (),
+    subject: Numbers = (),
+    *,
+    times: Numbers = (),
+    numbers: Numbers = (),
+    is_stream: bool = False,
+) -> Recording:
+    """Return frames of a plain board; what is empty is not known.
 
-
-def _unknown() -> npt.NDArray[np.int64]:
-    return np.zeros(0, np.int64)
-
-
-@dataclass(frozen=True, slots=True)
-class Presses:
-    """Frames, and what is known of them.
-
-    Attributes:
-        frames: Shape (frames, rows, columns), whole numbers.
-        sensor: Whose frames they are.
-        label: Shape (frames,): the place of the class in `label_names`; empty if it
-            is not known.
-        label_names: The names of the classes.
-        subject: Shape (frames,): who was pressing; empty if it is not known.
-        is_stream: Whether the frames follow each other, as in a recording.
-        times: Shape (frames,): in seconds; empty if they are not known.
-        numbers: Shape (frames,): of each frame; empty if they are not known.
-        placement: Shape (frames,): when something was put down, from 1; empty if each
-            frame is a placement of its own.
+    Without times there are 44 frames a second, and without numbers they are 0, 1, ...
     """
-
-    frames: Cells
-    sensor: Sensor
-    label: npt.NDArray[np.int64] = field(default_factory=_unknown)
-    label_names: tuple[str, ...] = ()
-    subject: npt.NDArray[np.int64] = field(default_factory=_unknown)
-    is_stream: bool = False
-    times: npt.NDArray[np.float64] = field(default_factory=_no_times)
-    numbers: npt.NDArray[np.int64] = field(default_factory=_unknown)
-    placement: npt.NDArray[np.int64] = field(default_factory=_unknown)
-
-    def of_class(self, name: str) -> Presses:
-        """Return the same frames, all of one class."""
-        code = np.zeros(len(self.frames), np.int64)
-        return replace(self, label=code, label_names=(name,))
-
-    def on(self, sensor: Sensor, name: str) -> Presses:
-        """Return the same frames as those of a board's sensor.
-
-        Raises:
-            ReadError: If they are of another size; it begins with the name.
-        """
-        rows, columns = self.frames.shape[1:]
-        if (sensor.rows, sensor.columns) != (rows, columns):
-            raise ReadError(
-                f"{name}: holds frames of {rows} x {columns} cells, and the board has "
-                f"{sensor.rows} x {sensor.columns}"
-            )
-        return replace(self, sensor=sensor)
+    count = len(frames)
+    return Recording(
+        Board("frames", sensor, Marker("AA 55", bits=sensor.bits)),
+        frames,
+        np.array(times) if len(times) else np.arange(count) / FRAMES_A_SECOND,
+        np.array(numbers if len(numbers) else range(count), np.int64),
+        Counters(frames=count),
+        label=np.array(label, np.int64),
+        label_names=label_names,
+        subject=np.array(subject, np.int64),
+        is_stream=is_stream,
+    )
 
 
-def read_presses(path: PathLike, *, label: str = "label") -> Presses:
-    """Return the frames of an archive.
-
-    The classes are in the array `label`, and their names in that of `LABEL_names`.
-
-    Raises:
-        ReadError: If it is no such archive, or larger than 1 GiB.
-    """
+def _read_archive(path: PathLike, label: str) -> Recording:
+    """Return the frames of an archive, whose classes are in the array of that name."""
     name = os.fspath(path)
     arrays = _arrays(read_bounded(path, LIMIT), name, label)
     frames = arrays.get("frames")
@@ -170,9 +134,16 @@ def read_presses(path: PathLike, *, label: str = "label") -> Presses:
     full = _number(arrays.get("full"), usual, 1, 65535, f"{name}: 'full'")
     least = _number(arrays.get("threshold"), 0, 0, full - 1, f"{name}: 'threshold'")
     rows, columns = frames.shape[1:]
-    sensor = Sensor(rows, columns, full, least)
-    is_stream = len(times) > 0
-    return Presses(frames, sensor, labels, names, subject, is_stream, times, numbers)
+    return labelled(
+        frames,
+        Sensor(rows, columns, full, least),
+        labels,
+        names,
+        subject,
+        times=times,
+        numbers=numbers,
+        is_stream=len(times) > 0,
+    )
 
 
 def _usual_full(frames: Cells) -> int:
@@ -187,24 +158,20 @@ def _check_sides(sides: Sequence[int], name: str) -> None:
         )
 
 
-def presses_content(presses: Presses) -> bytes:
+def presses_content(found: Recording) -> bytes:
     """Return an archive; the same frames give the same bytes."""
     arrays: dict[str, npt.NDArray[Any]] = {
-        "frames": presses.frames,
-        "full": np.array(presses.sensor.full, np.int64),
+        "frames": found.frames,
+        "full": np.array(found.sensor.full),
+        "threshold": np.array(found.sensor.threshold),
     }
-    if presses.sensor.threshold:
-        arrays["threshold"] = np.array(presses.sensor.threshold, np.int64)
-    if len(presses.label):
-        arrays["label"] = presses.label
-        arrays["label_names"] = np.array(presses.label_names, np.str_)
-    if len(presses.subject):
-        arrays["subject"] = presses.subject
-    return packed_arrays(arrays)
-
-
-def packed_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
-    """Return a numpy archive; the same arrays give the same bytes."""
+    if len(found.label):
+        arrays["label"] = found.label
+        arrays["label_names"] = np.array(found.label_names, np.str_)
+    if len(found.subject):
+        arrays["subject"] = found.subject
+    if found.is_stream:
+        arrays |= {"times": found.times, "numbers": found.numbers}
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for name, values in arrays.items():
@@ -260,9 +227,7 @@ def _array(content: bytes, name: str, title: str) -> npt.NDArray[Any]:
             f"{name}: {title!r} is cut or damaged: {rest} bytes do not make {shape}"
         )
     flat = np.frombuffer(content, dtype, offset=file.tell())
-    if is_turned:
-        return flat.reshape(shape[::-1]).T
-    return flat.reshape(shape)
+    return flat.reshape([*map(int, shape)], order="F" if is_turned else "C")
 
 
 def _texts(found: npt.NDArray[Any] | None, name: str, title: str) -> tuple[str, ...]:
@@ -296,7 +261,7 @@ def _times(
     found: npt.NDArray[Any] | None, count: int, name: str
 ) -> npt.NDArray[np.float64]:
     if found is None:
-        return _no_times()
+        return np.zeros(0, np.float64)
     times = found.astype(np.float64)
     most = _MOST["time"]
     if times.shape != (count,) or not ((times >= 0.0) & (times <= most)).all():
@@ -319,50 +284,15 @@ def _number(
     return int(found.item())
 
 
-def read_frames(
+def open_frames(
     path: PathLike,
+    board: Board | None = None,
     *,
     full: int | None = None,
     threshold: int | None = None,
     label: str = "label",
-) -> Presses:
-    """Return the frames of a file.
-
-    Args:
-        path: A recording, a table whose name ends in .csv, or a numpy archive (see
-            `fuzzytree.tactile.presses`).
-        full: What a cell takes, instead of what the file says; not for recordings.
-        threshold: Above it a cell is pressed, the same way.
-        label: The array of the classes in an archive.
-
-    Raises:
-        ReadError: If the file is none of them.
-    """
-    name = os.fspath(path)
-    if Path(path).is_fifo():  # it is read twice, and can keep us waiting
-        raise ReadError(f"{name}: is a pipe, and no file")
-    try:
-        with Path(path).open("rb") as file:
-            is_recording = file.read(len(MAGIC)) == MAGIC
-    except (OSError, ValueError) as error:
-        raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
-    if is_recording:
-        recording = read_recording(path)
-        return Presses(recording.frames, recording.board.sensor, is_stream=True)
-    if Path(path).suffix.lower() == _TABLE:
-        presses = _read_table(path, 255 if full and full <= 255 else 65535)
-    else:
-        presses = read_presses(path, label=label)
-    own = presses.sensor
-    try:
-        limit = own.full if full is None else full
-        least = own.threshold if threshold is None else threshold
-        return replace(presses, sensor=Sensor(own.rows, own.columns, limit, least))
-    except InvalidModelError as error:
-        raise ReadError(f"{name}: {error}") from error
-
-
-def open_frames(path: PathLike, board: Board | None = None) -> FrameFile:
+    is_strict: bool = True,
+) -> FrameFile:
     """Return the frames of a file, one by one, and what sent them.
 
     Where an archive or a table has no times there are 44 frames a second, and where it
@@ -371,45 +301,58 @@ def open_frames(path: PathLike, board: Board | None = None) -> FrameFile:
     Args:
         path: A recording, an archive (.npz) or a table (.csv).
         board: What sent the frames of an archive or table; a plain one if None.
+        full: What a cell of a plain board takes, instead of what the file says.
+        threshold: Above it a cell is pressed, the same way.
+        label: The array of the classes in an archive.
+        is_strict: Whether each cell must be what the board can send.
 
     Raises:
         ReadError: If the file is none of them, does not fit the board, or is a
             recording, which has its own.
     """
-    name = os.fspath(path)
-    if Path(path).suffix.lower() not in (_TABLE, ".npz"):
+    name, suffix = os.fspath(path), Path(path).suffix.lower()
+    if suffix not in (_TABLE, ".npz"):
         if board is not None:
             raise ReadError(f"{name}: a recording has its own board; name no other one")
         return RecordingFile(path)
-    if board is None:
-        found = read_frames(path)
-        sensor = found.sensor
-        board = Board("frames", sensor, Marker("AA 55", bits=sensor.bits))
+    if suffix == _TABLE:
+        most = full if board is None else board.sensor.full
+        found = _read_table(path, 255 if most and most <= 255 else 65535)
     else:
-        sensor = board.sensor
-        found = read_frames(path, full=sensor.full, threshold=sensor.threshold)
-        found = found.on(sensor, name)
-    frames, count, most = found.frames, len(found.frames), sensor.largest
-    if frames.min() < 0 or frames.max() > most:
+        found = _read_archive(path, label)
+    try:
+        if board is None:
+            given = {"full": full, "threshold": threshold}
+            stated = {key: one for key, one in given.items() if one is not None}
+            sensor = structs.replace(found.sensor, **stated)
+            board = Board("frames", sensor, Marker("AA 55", bits=sensor.bits))
+        check_frames(board.sensor, found.frames)
+    except (InvalidModelError, TableError) as error:
+        raise ReadError(f"{name}: {error}") from error
+    frames, most = found.frames, board.sensor.largest
+    if is_strict and (frames.min() < 0 or frames.max() > most):
         place, row, column = np.argwhere((frames < 0) | (frames > most))[0].tolist()
         wrong = frames[place, row, column]
         raise ReadError(
             f"{name}: r{row}c{column} of frame {place} is {wrong}, and no whole number "
             f"from 0 to {most}"
         )
-    return Recording(
-        board,
-        frames.astype(sensor.dtype, copy=False),
-        found.times if len(found.times) else np.arange(count) / FRAMES_A_SECOND,
-        found.numbers if len(found.numbers) else np.arange(count),
-        Counters(frames=count),
-        damaged=0,
-        cut_bytes=0,
-        started_ns=0,
-    )
+    if is_strict:
+        frames = frames.astype(board.sensor.dtype, copy=False)
+    return replace(found, board=board, frames=frames)
 
 
-def _read_table(path: PathLike, most: int) -> Presses:
+def read_frames(path: PathLike, *, label: str = "label") -> Recording:
+    """Return all frames of a file, which may hold any whole numbers.
+
+    Raises:
+        ReadError: As `open_frames`, or if they are too many for memory.
+    """
+    with open_frames(path, label=label, is_strict=False) as file:
+        return file.whole()
+
+
+def _read_table(path: PathLike, most: int) -> Recording:
     """Return the frames of a table, whose cells are at most so much."""
     name = os.fspath(path)
     titles: list[str] = []
@@ -444,14 +387,9 @@ def _read_table(path: PathLike, most: int) -> Presses:
     frames: Cells = np.concatenate(cells)
     if frames.max() <= 255:
         frames = frames.astype(np.uint8)
-    times, numbers = (np.concatenate(part or [_no_times()]) for part in others.values())
-    return Presses(
-        frames,
-        Sensor(*sides, _usual_full(frames)),
-        is_stream=True,
-        times=times,
-        numbers=numbers.astype(np.int64),
-    )
+    times, numbers = (np.concatenate(part) if part else () for part in others.values())
+    sensor = Sensor(*sides, _usual_full(frames))
+    return labelled(frames, sensor, times=times, numbers=numbers, is_stream=True)
 
 
 def _cell_places(
@@ -520,3 +458,6 @@ def _fits(text: str, most: int, *, is_whole: bool) -> bool:
         return False
     is_plain = text.isascii() and "_" not in text
     return is_plain and 0.0 <= value <= most and not (is_whole and value % 1)
+
+
+Presses, read_presses = labelled, read_frames  # `tactile press` calls them so

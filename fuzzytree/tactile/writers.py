@@ -17,9 +17,9 @@ import numpy as np
 from fuzzytree.errors import MissingExtraError, WriteError, install_hint
 from fuzzytree.files import PathLike, open_atomically, write_atomically
 from fuzzytree.tactile.board_file import board_text
-from fuzzytree.tactile.link.recording import FrameFile, Recording, write_recording
+from fuzzytree.tactile.link.recording import FrameFile, write_recording
 from fuzzytree.tactile.plots import draw_frames
-from fuzzytree.tactile.presses import packed_arrays
+from fuzzytree.tactile.presses import presses_content
 from fuzzytree.tactile.report.live import PALETTE, shades
 from fuzzytree.tactile.rest import Rest
 from fuzzytree.tactile.sensor import FRAMES_A_SECOND, Sensor, pressed
@@ -48,15 +48,7 @@ def write_table(path: PathLike, file: FrameFile) -> None:
 
 def write_arrays(path: PathLike, file: FrameFile) -> None:
     """Write a numpy archive that the other actions read."""
-    found = file if isinstance(file, Recording) else file.whole()
-    arrays = {
-        "frames": found.frames,
-        "full": np.array(found.board.sensor.full),
-        "threshold": np.array(found.board.sensor.threshold),
-        "times": found.times,
-        "numbers": found.numbers,
-    }
-    write_atomically(path, packed_arrays(arrays))
+    write_atomically(path, presses_content(file.whole()))
 
 
 def write_board(path: PathLike, file: FrameFile) -> None:

@@ -17,7 +17,7 @@ from experiment_study import Study
 import fuzzytree as ft
 from fuzzytree.schemas.generation import of_result
 from fuzzytree.tactile.board_file import load_board
-from fuzzytree.tactile.presses import Presses, read_presses
+from fuzzytree.tactile.presses import labelled, read_frames
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.sensor import Sensor
 from tests.cli.conftest import folder, originals
@@ -54,7 +54,7 @@ def bars(folder: Path) -> Path:
     label, subject = np.arange(24) % 2, np.arange(24) // 8
     path = folder / "bars.npz"
     write_presses(
-        path, Presses(frames, Sensor(6, 6, 200), label, ("upright", "flat"), subject)
+        path, labelled(frames, Sensor(6, 6, 200), label, ("upright", "flat"), subject)
     )
     return path
 
@@ -118,7 +118,7 @@ def test_a_folder_holds_a_model_that_recognises_the_frames(
     assert "next     fuzzytree show found/tree.yaml" in err
     tree, board = ft.load("found/tree.yaml"), load_board("found/board.yaml")
     assert isinstance(tree, ft.FuzzyTree)
-    presses = read_presses(bars)
+    presses = read_frames(bars)
     codes = Recogniser(tree, board.sensor)(presses.frames).codes
     assert codes.tolist() == presses.label.tolist()
     assert isinstance(ft.load("found/rules.yaml"), ft.RuleBase)

@@ -15,7 +15,7 @@ from experiment_tasks import (
 )
 
 from fuzzytree.errors import ReadError, TableError
-from fuzzytree.tactile.presses import Presses
+from fuzzytree.tactile.presses import labelled
 from fuzzytree.tactile.sensor import Sensor
 from tests.tactile.archives import write_presses
 
@@ -26,7 +26,7 @@ def saved(path: Path, *, subject: list[int] | None, names: str = "ab") -> Path:
     frames[:, 0, 0] = [9, 8, 200, 210]
     write_presses(
         path,
-        Presses(
+        labelled(
             frames,
             Sensor(2, 2),
             np.array([0, 0, 1, 1]),

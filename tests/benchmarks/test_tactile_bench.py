@@ -14,7 +14,7 @@ from tactile_timing import FramesStudy
 
 from fuzzytree.api.verbs import save
 from fuzzytree.schemas.generation import of_result
-from fuzzytree.tactile.presses import Presses
+from fuzzytree.tactile.presses import labelled
 from tests.tactile.archives import write_presses
 from tests.tactile.frame_models import SMALL, learnt_tree
 
@@ -32,7 +32,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save(learnt_tree(SMALL, ("area", "S1")), "tree.yaml")
     cells = np.random.default_rng(0).integers(0, 101, (9, 6, 4)).astype(np.uint8)
     cells[0] = 0
-    write_presses("f.npz", Presses(cells, SMALL))
+    write_presses("f.npz", labelled(cells, SMALL))
 
 
 def test_the_schema_is_the_one_that_the_code_generates() -> None:

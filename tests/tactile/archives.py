@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from fuzzytree.files import PathLike, write_atomically
-from fuzzytree.tactile.presses import Presses, presses_content
+from fuzzytree.tactile.link.recording import Recording
+from fuzzytree.tactile.presses import presses_content
 
 
-def write_presses(path: PathLike, presses: Presses) -> None:
+def write_presses(path: PathLike, presses: Recording) -> None:
     """Write an archive of frames."""
     write_atomically(path, presses_content(presses))

@@ -7,9 +7,9 @@ import io
 import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from itertools import compress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -27,8 +27,8 @@ from fuzzytree.files import check_place, write_atomically
 from fuzzytree.tactile.cli.sensors import FramesOptions, frames_of_options
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.presses import Presses
     from fuzzytree.tactile.runtimes.frames import Features
+    from fuzzytree.tactile.sensor import Cells, Sensor
 
 USUAL = "log orientation / force,log area"
 """Features that depend little on the force of a press and on the gain of the sensor."""
@@ -36,6 +36,8 @@ USUAL = "log orientation / force,log area"
 FEW_PLACEMENTS = 10
 CLASS = "class"
 """The column of the classes."""
+
+SUBJECT = "subject"
 
 PLACEMENT = "placement"
 """The column of the placements, from 1, of frames that follow each other."""
@@ -87,13 +89,20 @@ def command(options: TactileFeaturesOptions) -> int:
     return 0
 
 
-def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[Presses]:
+class _Part(NamedTuple):
+    """The frames of a file, the sensor they fit, and the columns that are known."""
+
+    frames: Cells
+    sensor: Sensor
+    columns: dict[str, Sequence[Any]]
+
+
+def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_Part]:
     """Yield the frames of each file, of the class that stands before its name.
 
     Count frames with saturated cells, with several objects, and placements.
     """
-    from fuzzytree.tactile.boards import Board, Marker
-    from fuzzytree.tactile.presses import open_frames
+    from fuzzytree.tactile.link.recording import Recording
     from fuzzytree.tactile.recognition.objects import followed
     from fuzzytree.tactile.sensor import saturated
 
@@ -106,32 +115,35 @@ def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[Pr
             raise click.UsageError(
                 f"of several files, each has a class: CLASS={path}, not {path}"
             )
-        found = frames_of_options(path, options, label=options.label)
-        if found.is_stream:
-            plain = Board("frames", found.sensor, Marker("AA 55", found.sensor.bits))
-            is_table = Path(path).suffix.lower() == ".csv"
-            with open_frames(path, plain if is_table else None) as file:
-                seen = followed(file, found.sensor)
-            counts["saturated"] += seen.saturated
-            counts["several"] += seen.several
-            placements = seen.placements + placed
-            placed = int(placements.max(initial=placed))
-            found = replace(
-                found, frames=seen.frames, sensor=seen.sensor, placement=placements
-            )
-        else:
-            full = saturated(found.sensor, found.frames) > 0
-            counts["saturated"] += int(full.sum())
-        yield found.of_class(word) if word else found
+        columns: dict[str, Sequence[Any]] = {CLASS: ()} if word else {}
+        with frames_of_options(path, options, options.label) as file:
+            if isinstance(file, Recording):
+                if len(file.label):
+                    columns[CLASS] = [file.label_names[code] for code in file.label]
+                if len(file.subject):
+                    columns[SUBJECT] = file.subject.tolist()
+            if isinstance(file, Recording) and not file.is_stream:
+                frames, sensor = file.frames, file.sensor
+                counts["saturated"] += int((saturated(sensor, frames) > 0).sum())
+            else:
+                seen = followed(file)
+                frames, sensor = seen.frames, seen.sensor
+                counts["saturated"] += seen.saturated
+                counts["several"] += seen.several
+                columns[PLACEMENT] = (seen.placements + placed).tolist()
+                placed += int(seen.placements.max(initial=0))
+        if word:
+            columns[CLASS] = [word] * len(frames)
+        yield _Part(frames, sensor, columns)
 
 
-def _check_alike(frames: Sequence[str], parts: Sequence[Presses]) -> None:
+def _check_alike(frames: Sequence[str], parts: Sequence[_Part]) -> None:
     """Refuse files that make no table together.
 
     Sensors may only differ in what rests on them, and all state subjects or none does.
     """
 
-    def kind(part: Presses) -> str:
+    def kind(part: _Part) -> str:
         found = part.sensor
         size = f"{found.rows} x {found.columns} cells"
         return f"{size}, full {found.full}, threshold {found.threshold}"
@@ -142,16 +154,18 @@ def _check_alike(frames: Sequence[str], parts: Sequence[Presses]) -> None:
                 f"{name}: is of another sensor ({kind(part)}) than {frames[0]} "
                 f"({kind(parts[0])})"
             )
-        if bool(len(part.subject)) != bool(len(parts[0].subject)):
-            raise ReadError(f"of {name} and {frames[0]}, only one states subjects")
-        if bool(len(part.placement)) != bool(len(parts[0].placement)):
-            raise ReadError(f"of {name} and {frames[0]}, only one is a recording")
+        for column, text in (
+            (SUBJECT, "states subjects"),
+            (PLACEMENT, "is a recording"),
+        ):
+            if (column in part.columns) != (column in parts[0].columns):
+                raise ReadError(f"of {name} and {frames[0]}, only one {text}")
 
 
 def _table(
     options: TactileFeaturesOptions,
     output: str,
-    parts: Sequence[Presses],
+    parts: Sequence[_Part],
     costs: Mapping[str, float],
     counted_frames: Counter[str],
 ) -> int:
@@ -166,7 +180,7 @@ def _table(
         answer_bytes(content)
         return 0
     write_atomically(output, content)
-    presses, sensor = parts[0], parts[0].sensor
+    known, sensor = parts[0].columns, parts[0].sensor
     counts = [len(part.frames) for part in parts]
     full, several = counted_frames["saturated"], counted_frames["several"]
     none = sum(int((~part.is_pressed).sum()) for part in found)
@@ -188,14 +202,12 @@ def _table(
             text = f"below {FEW_PLACEMENTS}, `live` finds more of its presses unknown"
             rows.append(("few", name, f"{counted(count, 'placement')}: {text}"))
     after = ["fuzzytree", "learn", output, "--target", CLASS, "-o", "tree.yaml"]
-    if len(presses.subject):
-        after += ["--groups", "subject"]
-    elif len(presses.placement):
-        after += ["--groups", PLACEMENT]
+    groups = next((one for one in (SUBJECT, PLACEMENT) if one in known), "")
+    after += ["--groups", groups] if groups else []
     if sensor.unit:
         for name in filter(lambda one: has_unit(feature_of(one)), names):
             after += ["--unit", f"{name}={sensor.unit}"]
-    text = f"next: {shlex.join(after)}" if len(presses.label) else "without classes"
+    text = f"next: {shlex.join(after)}" if CLASS in known else "without classes"
     rows.append(("wrote", output, f"{counted(len(names), 'feature')}; {text}"))
     say_rows(*rows, quiet=options.quiet)
     if options.as_json:
@@ -214,36 +226,25 @@ def _table(
     return 0
 
 
-def _placed(parts: Sequence[Presses], found: Sequence[Features]) -> dict[str, int]:
+def _placed(parts: Sequence[_Part], found: Sequence[Features]) -> Counter[str]:
     """Return how often something was put down, for each class that is known."""
     placed: Counter[str] = Counter()
     for part, features in zip(parts, found, strict=True):
-        for code, name in enumerate(part.label_names if len(part.label) else ()):
-            rows = (part.label == code) & features.is_pressed
-            numbers = part.placement[rows] if len(part.placement) else []
-            placed[name] += len({*numbers}) if len(part.placement) else int(rows.sum())
-    return dict(placed)
+        classes = part.columns.get(CLASS, ())
+        numbers = part.columns.get(PLACEMENT, range(len(part.frames)))
+        pairs = zip(classes, numbers, features.is_pressed, strict=False)
+        placed.update(dict.fromkeys(classes, 0))
+        placed.update(name for name, _ in {one[:2] for one in pairs if one[2]})
+    return placed
 
 
-def _csv(parts: Sequence[Presses], found: Sequence[Features]) -> str:
-    """Return the table: features, and class and subject where known."""
-    has_class = bool(len(parts[0].label))
-    has_subject = bool(len(parts[0].subject))
-    heads = [*found[0].names]
-    heads += [CLASS] if has_class else []
-    heads += ["subject"] if has_subject else []
-    heads += [PLACEMENT] if len(parts[0].placement) else []
+def _csv(parts: Sequence[_Part], found: Sequence[Features]) -> str:
+    """Return the table: features, and class, subject and placement where known."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(heads)
+    table.writerow([*found[0].names, *parts[0].columns])
     for part, features in zip(parts, found, strict=True):
-        rows = features.is_pressed.nonzero()[0]
-        columns: list[list[object]] = features.values[:, rows].tolist()
-        if has_class:
-            columns.append([part.label_names[code] for code in part.label[rows]])
-        if has_subject:
-            columns.append(part.subject[rows].tolist())
-        if len(part.placement):
-            columns.append(part.placement[rows].tolist())
+        columns: list[list[object]] = features.values[:, features.is_pressed].tolist()
+        columns += [[*compress(c, features.is_pressed)] for c in part.columns.values()]
         table.writerows(zip(*columns, strict=True))
     return text.getvalue()

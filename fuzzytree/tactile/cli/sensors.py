@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import click
 
 from fuzzytree.cli import ResultOptions, option, say_rows, wrong_options
+from fuzzytree.errors import ReadError, TableError
 
 if TYPE_CHECKING:
     from fuzzytree.model import Model
-    from fuzzytree.tactile.presses import Presses
+    from fuzzytree.tactile.boards import Board
+    from fuzzytree.tactile.link.recording import FrameFile
     from fuzzytree.tactile.sensor import Cells, Sensor
 
 _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
@@ -55,7 +57,7 @@ def sensor_of_options(options: SensorOptions) -> Sensor:
 
     if options.board is not None:
         others = (options.size, options.full, options.threshold)
-        return _sensor_of_board(options.board, "--sensor, --full and", others)
+        return _board(options.board, "--sensor, --full and", others).sensor
     if options.size is None:
         raise click.UsageError(
             "name the board with --board, or its size: --sensor 16x16"
@@ -70,35 +72,34 @@ def sensor_of_options(options: SensorOptions) -> Sensor:
         return Sensor(rows, columns, full, options.threshold or 0)
 
 
-def _sensor_of_board(board: str, names: str, others: Sequence[object]) -> Sensor:
-    """Return the sensor of `--board`; refuse options that contradict it."""
+def _board(name: str, names: str, others: Sequence[object]) -> Board:
+    """Return the board of `--board`; refuse options that contradict it."""
     from fuzzytree.tactile.board_file import load_board
 
     if any(one is not None for one in others):
         raise click.UsageError(f"--board sets {names} --threshold; choose one of them")
-    known = load_board(board)
+    known = load_board(name)
     if known.calibration is not None:
         text = "frames are read without a calibration here; name a board without one"
-        raise click.UsageError(f"{board} is calibrated, and {text}")
-    return known.sensor
+        raise click.UsageError(f"{name} is calibrated, and {text}")
+    return known
 
 
-def frames_of_options(
-    path: str, options: FramesOptions, *, label: str = "label"
-) -> Presses:
-    """Return the frames of an archive or recording, with the sensor they fit.
+def frames_of_options(path: str, options: FramesOptions, label: str) -> FrameFile:
+    """Return the frames of a file, one by one, with the sensor they fit.
 
     Raises:
         click.UsageError: If a board is named with --full or --threshold.
         ReadError: If a file is none, or the frames do not fit the board.
     """
-    from fuzzytree.tactile.presses import read_frames
+    from fuzzytree.tactile.presses import open_frames
 
-    full, threshold = options.full, options.threshold
-    if options.board is None:
-        return read_frames(path, full=full, threshold=threshold, label=label)
-    sensor = _sensor_of_board(options.board, "--full and", (full, threshold))
-    return read_frames(path, label=label).on(sensor, path)
+    full, threshold, board = options.full, options.threshold, None
+    if options.board is not None:
+        board = _board(options.board, "--full and", (full, threshold))
+    return open_frames(
+        path, board, full=full, threshold=threshold, label=label, is_strict=False
+    )
 
 
 def frames_of_file(
@@ -114,13 +115,17 @@ def frames_of_file(
     if path is None:
         return None
     from fuzzytree.tactile.presses import read_frames
+    from fuzzytree.tactile.sensor import check_frames
 
     found = read_frames(path)
     stated = found.sensor.threshold
     if stated not in (0, sensor.threshold):  # 0 where it states none
         text = f"states the threshold {stated}, not {sensor.threshold}"
         say_rows(("differs", path, text), quiet=quiet)
-    return found.on(sensor, path).frames
+    try:
+        return check_frames(sensor, found.frames)
+    except TableError as error:
+        raise ReadError(f"{path}: {error}") from error
 
 
 def frames_model(path: str) -> Model:

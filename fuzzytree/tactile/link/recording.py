@@ -14,7 +14,7 @@ import threading
 import time
 import zlib
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, field, fields
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -175,9 +175,13 @@ def crc(content: bytes) -> bytes:
     return zlib.crc32(content).to_bytes(4, "little")
 
 
+def _unknown() -> npt.NDArray[np.int64]:
+    return np.zeros(0, np.int64)
+
+
 @dataclass(frozen=True, slots=True)
 class Recording(contextlib.AbstractContextManager["Recording"]):
-    """All frames of a recording that are whole; they are read as a `RecordingFile`.
+    """All frames of a file that are whole; they are read as a `RecordingFile`.
 
     Attributes:
         board: What sent them, with the baseline that was measured.
@@ -189,6 +193,12 @@ class Recording(contextlib.AbstractContextManager["Recording"]):
         cut_bytes: Bytes at the end that are less than a record.
         started_ns: When the recording began, in nanoseconds since 1970 (UTC); 0 if
             that is not known.
+        label: Shape (frames,): the place of the class in `label_names`; empty if it
+            is not known.
+        label_names: The names of the classes.
+        subject: Shape (frames,): who was pressing; empty if it is not known.
+        is_stream: Whether the frames follow each other; times and numbers are made up
+            otherwise.
     """
 
     board: Board
@@ -196,9 +206,13 @@ class Recording(contextlib.AbstractContextManager["Recording"]):
     times: npt.NDArray[np.float64]
     numbers: npt.NDArray[np.int64]
     counters: Counters
-    damaged: int
-    cut_bytes: int
-    started_ns: int
+    damaged: int = 0
+    cut_bytes: int = 0
+    started_ns: int = 0
+    label: npt.NDArray[np.int64] = field(default_factory=_unknown)
+    label_names: tuple[str, ...] = ()
+    subject: npt.NDArray[np.int64] = field(default_factory=_unknown)
+    is_stream: bool = True
 
     @property
     def sensor(self) -> Sensor:
@@ -211,6 +225,10 @@ class Recording(contextlib.AbstractContextManager["Recording"]):
         rows = zip(self.frames, times, numbers, strict=True)
         for count, (cells, time_s, number) in enumerate(rows, 1):
             yield FrameRecord(Frame(cells, time_s, number), Counters(frames=count))
+
+    def whole(self) -> Recording:
+        """Return itself."""
+        return self
 
     def close(self) -> None:
         """Do nothing: all is in memory."""

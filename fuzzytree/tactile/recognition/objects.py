@@ -243,21 +243,18 @@ class Followed:
     placements: npt.NDArray[np.int64]
 
 
-def followed(
-    file: FrameFile, sensor: Sensor | None = None, least: int = LEAST_AREA
-) -> Followed:
+def followed(file: FrameFile, least: int = LEAST_AREA) -> Followed:
     """Return the frames of a file as live recognition would see them.
 
     Args:
         file: A recording, an archive or a table.
-        sensor: What the cells read at rest at the beginning; as in the file if None.
         least: The fewest cells of an object.
 
     Raises:
         ReadError: If the file cannot be read.
     """
     board = file.board
-    rest = Rest(sensor or board.sensor, board.start.follow_s, board.calibration)
+    rest = Rest(board.sensor, board.start.follow_s, board.calibration)
     stated = file.sensor
     frames: list[npt.NDArray[np.uint16]] = []
     placements: list[int] = []

@@ -14,7 +14,7 @@ from fuzzytree.model.contracts import Written
 from fuzzytree.tactile.cli.sensors import frames_of_file
 from fuzzytree.tactile.exporters import onnx_frames
 from fuzzytree.tactile.exporters.onnx_frames import write_frames
-from fuzzytree.tactile.presses import Presses
+from fuzzytree.tactile.presses import labelled
 from fuzzytree.tactile.sensor import Sensor
 from tests.tactile.archives import write_presses
 from tests.tactile.frame_models import SMALL, learnt_tree, raw_rules
@@ -33,7 +33,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save(raw_rules(tree), "rules.yaml")
     cells = np.random.default_rng(0).integers(0, 101, (9, 6, 4)).astype(np.uint8)
     cells[0] = 0
-    write_presses("f.npz", Presses(cells, SMALL))
+    write_presses("f.npz", labelled(cells, SMALL))
 
 
 def test_a_graph_is_checked_and_written(capsys: Said) -> None:
@@ -55,7 +55,7 @@ def test_frames_that_were_pressed_above_another_threshold_are_reported(
     capsys: Said,
 ) -> None:
     cells = np.ones((1, 6, 4), np.uint8)
-    write_presses("six.npz", Presses(cells, Sensor(6, 4, 100, 6)))
+    write_presses("six.npz", labelled(cells, Sensor(6, 4, 100, 6)))
     for threshold in (4, 6):
         frames_of_file("six.npz", Sensor(6, 4, 100, threshold))
     stated = capsys.readouterr().err
@@ -111,8 +111,8 @@ def test_nothing_is_written_where_a_way_disagrees(
          "reject"),
         (["pad.onnx", *SIZE, "--set", "ir=8", "--set", "ir=9"], "the option 'ir' is "
          "stated twice"),
-        (["pad.onnx", "--sensor", "4x6", "--data", "f.npz"], "f.npz: holds frames of "
-         "6 x 4 cells, and the board has 4 x 6"),
+        (["pad.onnx", "--sensor", "4x6", "--data", "f.npz"], "f.npz: a frame of "
+         "6 x 4 cells does not fit a sensor of 4 x 6"),
     ],
 )  # fmt: skip
 def test_mistakes_in_the_command_are_one_sentence(

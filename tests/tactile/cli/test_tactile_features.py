@@ -13,7 +13,7 @@ import pytest
 from fuzzytree.cli.program import main
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link.recording import Recorder
-from fuzzytree.tactile.presses import Presses
+from fuzzytree.tactile.presses import labelled
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from tests.tactile.archives import write_presses
 
@@ -27,7 +27,7 @@ def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     cells[3, 2, 2:5] = 40
     label, subject = np.array([0, 1, 0, 0]), np.array([1, 1, 2, 2])
     names = ("small", "large")
-    write_presses("f.npz", Presses(cells, Sensor(6, 6), label, names, subject))
+    write_presses("f.npz", labelled(cells, Sensor(6, 6), label, names, subject))
     return "f.npz"
 
 
@@ -122,7 +122,7 @@ def test_files_of_one_class_each_become_one_table(
         ("cup=cup.ftr", "f=g.npz"): "f=g.npz: is of another sensor (6 x 6 cells, full "
         "255, threshold 3) than cup=cup.ftr (6 x 6 cells, full 255, threshold 0)\n",
     }
-    write_presses("g.npz", Presses(cells, Sensor(6, 6, 255, 3)))
+    write_presses("g.npz", labelled(cells, Sensor(6, 6, 255, 3)))
     for given, text in refused.items():
         assert main(["tactile", "features", *given]) == 2
         assert capsys.readouterr().err == text
@@ -134,7 +134,7 @@ def test_a_pipe_is_refused_and_not_waited_for(
 ) -> None:
     os.mkfifo("pipe")
     assert main(["tactile", "features", "pipe"]) == 2
-    assert capsys.readouterr().err == "pipe: is a pipe, and no file\n"
+    assert capsys.readouterr().err == "pipe: is no file\n"
 
 
 def test_a_recording_is_seen_as_live_sees_it(

@@ -205,7 +205,7 @@ def test_frames_of_a_table_or_archive_are_recognised_as_those_of_a_recording(
 def test_a_table_of_another_size_than_its_board_is_reported(call: Call) -> None:
     Path("a.csv").write_text("r0c0,r0c1\n1,2\n")
     code, _, err = call("a.csv", "--model", "area.yaml", "--board", "mat.yaml")
-    text = "a.csv: holds frames of 1 x 2 cells, and the board has 4 x 4"
+    text = "a.csv: a frame of 1 x 2 cells does not fit a sensor of 4 x 4"
     assert (code, err) == (2, f"{text}\n")
 
 

@@ -24,7 +24,7 @@ from fuzzytree.tactile.boards import Board, Marker, Start
 from fuzzytree.tactile.link import SerialPort, ports
 from fuzzytree.tactile.link import recording as records
 from fuzzytree.tactile.link.recording import Recorder, read_recording
-from fuzzytree.tactile.presses import read_presses
+from fuzzytree.tactile.presses import read_frames
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
 Call = Callable[..., tuple[int, str, str]]
@@ -284,12 +284,18 @@ def test_frames_become_arrays_that_other_actions_read(call: Call, place: Path) -
     before = Path("a.npz").read_bytes()
     assert call("tactile", "replay", "a.ftr", "-o", "a.npz", "--quiet")[2] == ""
     assert Path("a.npz").read_bytes() == before
-    found = read_presses("a.npz")
+    found = read_frames("a.npz")
     assert (found.sensor.full, found.sensor.threshold) == (255, BOARD.sensor.threshold)
     assert (found.frames == read_recording("a.ftr").frames).all()
     arrays = np.load("a.npz", allow_pickle=False)
     assert arrays["times"].tolist() == [1.0, 1.25, 1.5, 2.25, 2.5, 3.75]
     assert arrays["numbers"].tolist() == [4, 5, 6, 9, 10, 15]
+    label = {"label": [0] * 6, "label_names": ["cup"], "subject": [3] * 6}
+    np.savez("s.npz", frames=found.frames, **label)  # type: ignore[arg-type]
+    assert call("tactile", "replay", "s.npz", "-o", "t.npz")[0] == 0
+    kept = np.load("t.npz", allow_pickle=False)
+    assert sorted(kept) == ["frames", "full", *sorted(label), "threshold"]
+    assert {name: kept[name].tolist() for name in label} == label
     sensor = Sensor(4, 5, masked=((0, 0),))
     with Recorder("m.ftr", Board("mat", sensor, Marker("AA 55"))) as recorder:
         recorder.write(Frame(_cells(9), 0.0, 0), Counters(frames=1))
