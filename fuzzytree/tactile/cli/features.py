@@ -24,7 +24,7 @@ from fuzzytree.cli import (
 )
 from fuzzytree.errors import ReadError
 from fuzzytree.files import check_place, write_atomically
-from fuzzytree.tactile.cli.sensors import FramesOptions, frames_of_options
+from fuzzytree.tactile.cli.sensors import FramesOptions, board_of_option
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.runtimes.frames import Features
@@ -103,10 +103,14 @@ def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_P
     Count frames with saturated cells, with several objects, and placements.
     """
     from fuzzytree.tactile.link.recording import Recording
+    from fuzzytree.tactile.presses import open_frames
     from fuzzytree.tactile.recognition.objects import followed
     from fuzzytree.tactile.sensor import saturated
 
-    placed = 0
+    placed, board = 0, None
+    own = {"full": options.full, "threshold": options.threshold}
+    if options.board is not None:
+        board = board_of_option(options.board, "--full and", [*own.values()])
     for text in options.frames:
         word, sign, path = text.partition("=")
         if not sign or Path(text).exists():
@@ -116,7 +120,8 @@ def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_P
                 f"of several files, each has a class: CLASS={path}, not {path}"
             )
         columns: dict[str, Sequence[Any]] = {CLASS: ()} if word else {}
-        with frames_of_options(path, options, options.label) as file:
+        label = options.label
+        with open_frames(path, board, **own, label=label, is_strict=False) as file:
             if isinstance(file, Recording):
                 if len(file.label):
                     columns[CLASS] = [file.label_names[code] for code in file.label]

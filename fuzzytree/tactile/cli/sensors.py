@@ -14,7 +14,6 @@ from fuzzytree.errors import ReadError, TableError
 if TYPE_CHECKING:
     from fuzzytree.model import Model
     from fuzzytree.tactile.boards import Board
-    from fuzzytree.tactile.link.recording import FrameFile
     from fuzzytree.tactile.sensor import Cells, Sensor
 
 _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
@@ -57,7 +56,7 @@ def sensor_of_options(options: SensorOptions) -> Sensor:
 
     if options.board is not None:
         others = (options.size, options.full, options.threshold)
-        return _board(options.board, "--sensor, --full and", others).sensor
+        return board_of_option(options.board, "--sensor, --full and", others).sensor
     if options.size is None:
         raise click.UsageError(
             "name the board with --board, or its size: --sensor 16x16"
@@ -72,7 +71,7 @@ def sensor_of_options(options: SensorOptions) -> Sensor:
         return Sensor(rows, columns, full, options.threshold or 0)
 
 
-def _board(name: str, names: str, others: Sequence[object]) -> Board:
+def board_of_option(name: str, names: str, others: Sequence[object]) -> Board:
     """Return the board of `--board`; refuse options that contradict it."""
     from fuzzytree.tactile.board_file import load_board
 
@@ -83,23 +82,6 @@ def _board(name: str, names: str, others: Sequence[object]) -> Board:
         text = "frames are read without a calibration here; name a board without one"
         raise click.UsageError(f"{name} is calibrated, and {text}")
     return known
-
-
-def frames_of_options(path: str, options: FramesOptions, label: str) -> FrameFile:
-    """Return the frames of a file, one by one, with the sensor they fit.
-
-    Raises:
-        click.UsageError: If a board is named with --full or --threshold.
-        ReadError: If a file is none, or the frames do not fit the board.
-    """
-    from fuzzytree.tactile.presses import open_frames
-
-    full, threshold, board = options.full, options.threshold, None
-    if options.board is not None:
-        board = _board(options.board, "--full and", (full, threshold))
-    return open_frames(
-        path, board, full=full, threshold=threshold, label=label, is_strict=False
-    )
 
 
 def frames_of_file(

@@ -9,6 +9,7 @@ import contextlib
 import io
 import math
 import os
+import re
 import stat
 import threading
 import time
@@ -42,6 +43,7 @@ MAGIC: Final = b"\x89FTR\r\n\x1a\n"
 MARK: Final = b"\xf5fr\n"
 REST: Final = b"\xf5rs\n"
 """What a record begins with that says what the cells read at rest from then on."""
+_BEGIN = re.compile(MARK + b"|" + REST)
 VERSIONS: Final = (1, 2)
 """The layouts that are read; the last one is written. The first has no such records."""
 LARGEST_BOARD: Final = 4 * 2**20
@@ -426,16 +428,9 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
                 tried += length if window.startswith((MARK, REST), at) else 0
                 if tried > _PATIENCE * (passed + at) + _TRIES_BYTES:
                     raise ReadError(f"{self._name}: is damaged all over")
-                after = min(
-                    (
-                        k
-                        for k in (window.find(m, at + 1) for m in (MARK, REST))
-                        if k > 0
-                    ),
-                    default=-1,
-                )
-                if after < 0:
-                    after = max(len(window) - len(MARK) + 1, at + 1)
+                found = _BEGIN.search(window, at + 1)
+                end = max(len(window) - len(MARK) + 1, at + 1)
+                after = found.start() if found else end
                 lost += after - at
                 at = after
             window, passed = window[at:], passed + at
