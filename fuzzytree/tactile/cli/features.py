@@ -137,6 +137,8 @@ def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_P
                 counts["several"] += seen.several
                 columns[PLACEMENT] = (seen.placements + placed).tolist()
                 placed += int(seen.placements.max(initial=0))
+        if not len(frames):
+            raise ReadError(f"{path}: holds no frame")
         if word:
             columns[CLASS] = [word] * len(frames)
         yield _Part(frames, sensor, columns)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.cli.program import main
+from fuzzytree.tactile.board_file import board_text
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link.recording import Recorder
 from fuzzytree.tactile.presses import labelled
@@ -69,6 +70,11 @@ def test_without_an_output_the_costs_are_listed(
 @pytest.mark.parametrize(
     ("words", "text"),
     [
+        (["no.ftr"], "no.ftr: holds no frame\n"),
+        (
+            ["no.ftr", "--board", "b.yaml"],
+            "no.ftr: a recording has its own board; name no other one\n",
+        ),
         (["none.npz"], "none.npz: cannot be read: no such file or directory\n"),
         (["bad.npz"], "bad.npz: is no numpy archive (.npz): File is not a zip file\n"),
         (["f.npz", "--full", "0"], "f.npz: full lies in 1 to 65535, not 0\n"),
@@ -83,6 +89,9 @@ def test_what_cannot_be_done_is_one_sentence(
     frames: str, capsys: pytest.CaptureFixture[str], words: list[str], text: str
 ) -> None:
     Path("bad.npz").write_text("no archive")
+    board = Board("mat", Sensor(6, 6), Marker("AA 55"))
+    Recorder("no.ftr", board).close()
+    Path("b.yaml").write_text(board_text(board))
     assert main(["tactile", "features", *words]) == 2
     assert capsys.readouterr().err == text
     assert not Path("t.csv").exists()
