@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import bisect
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -11,15 +12,11 @@ from fuzzytree.model import FuzzyTree, Model
 from fuzzytree.semantics import axis_values, landmarks
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.features.plain import plain_features
-from fuzzytree.tactile.sensor import Cells, Sensor
-
-Features = Callable[[Cells], npt.NDArray[np.float64]]
-"""Gives features of shape (features, frames)."""
+from fuzzytree.tactile.sensor import Cells, Sensor, baseline_of
 
 Whole = npt.NDArray[np.int64]
 
 _MOST_CUTS = 40
-_HALVINGS = 20  # 16 bits are done after them
 
 
 def aimed_frames(sensor: Sensor, random: int = 24, seed: int = 0) -> Cells:
@@ -36,9 +33,7 @@ def aimed_frames(sensor: Sensor, random: int = 24, seed: int = 0) -> Cells:
         >>> aimed_frames(Sensor(2, 2, threshold=9), 0)[:, 0, 0].tolist()[:4]
         [0, 9, 10, 255]
     """
-    base = np.zeros((sensor.rows, sensor.columns), np.int64)
-    if sensor.baseline:
-        base += np.array(sensor.baseline, np.int64).reshape(base.shape)
+    base = baseline_of(sensor)
     above = [*_plain(sensor, base), *_symmetric(sensor, base)]
     above += _presses(sensor, base, random, seed)
     frames = np.array([base, *above], np.int64)
@@ -97,98 +92,53 @@ def _presses(sensor: Sensor, base: Whole, count: int, seed: int) -> Iterator[Who
         yield base + height.astype(np.int64)
 
 
-def edge_frames(
-    frames: Cells, cuts: Sequence[tuple[int, float]], features: Features
-) -> Cells:
-    """Return pairs of frames that lie next to a cut on either side.
-
-    Between a frame below a cut and one above it, both given, all cells go over from
-    one to the other, and then one cell after another: halving finds where the feature
-    passes the cut. The two frames that are left differ by one in one cell.
-
-    Args:
-        frames: Shape (frames, rows, columns).
-        cuts: The line of a feature and its cut, each.
-        features: Computes the features of such frames.
-
-    Returns:
-        Two frames for each cut that lies between two of the frames' own values.
-    """
-    values = features(frames)
-    found: list[Cells] = []
-    for line, cut in dict.fromkeys(cuts):
-        is_above = values[line] > cut
-        if is_above.any() and not is_above.all():
-            below = np.where(is_above, -np.inf, values[line]).argmax()
-            above = np.where(is_above, values[line], np.inf).argmin()
-            pair = frames[below].astype(np.int64), frames[above].astype(np.int64)
-
-            def feature(frame: Whole, line: int = line) -> float:
-                return float(features(frame[np.newaxis])[line, 0])
-
-            found += _parted(pair, cut, feature)
-    if not found:
-        return frames[:0]
-    return np.array(found, np.int64).astype(frames.dtype)
-
-
-def _parted(
-    pair: tuple[Whole, Whole], cut: float, feature: Callable[[Whole], float]
-) -> tuple[Whole, Whole]:
-    """Bring a frame below a cut and one above it next to each other."""
-    below, above = pair
-    for _ in range(_HALVINGS):
-        middle = (below + above) // 2
-        if np.array_equal(middle, below) or np.array_equal(middle, above):
-            break
-        if feature(middle) > cut:
-            above = middle
-        else:
-            below = middle
-    changed = np.flatnonzero(below != above)
-    low, high = 0, len(changed)
-    while high - low > 1:
-        count = (low + high) // 2
-        if feature(_mixed(below, above, changed[:count])) > cut:
-            high = count
-        else:
-            low = count
-    ends = [_mixed(below, above, changed[:count]) for count in (low, high)]
-    return ends[0], ends[1]
-
-
-def _mixed(one: Whole, two: Whole, places: npt.NDArray[np.intp]) -> Whole:
-    """Return a frame whose cells at some places are another frame's."""
-    found = one.copy()
-    found.flat[places] = two.flat[places]
-    return found
-
-
 def proving_frames(made: FrameProgram, model: Model, presses: int = 12) -> Cells:
-    """Return what a written file is tried with: aimed frames, and pairs at its cuts."""
+    """Return what a written file is tried with: aimed frames, and pairs at its cuts.
+
+    The two frames of a pair differ by one in one cell, and lie on either side of a cut.
+    """
     frames = aimed_frames(made.sensor, presses)
 
-    def values(some: Cells) -> npt.NDArray[np.float64]:
+    def values(frame: Cells) -> dict[str, float]:
         """Return the values of the model's variables, combinations among them."""
-        rows = [plain_features(made, frame)[0] for frame in some]
-        named = [dict(zip(model.inputs, row, strict=True)) for row in rows]
-        axes = [axis_values(model.variables, row) for row in named]
-        return np.array([[*one.values()] for one in axes]).T
+        found, _ = plain_features(made, frame)
+        return axis_values(model.variables, dict(zip(model.inputs, found, strict=True)))
 
-    pairs = edge_frames(frames, cuts_of(model)[:_MOST_CUTS], values)
-    return np.concatenate([frames, pairs])
+    known, found = [*map(values, frames)], [*frames]
+    for name, cut in _cuts(model)[:_MOST_CUTS]:
+        order = sorted(range(len(known)), key=lambda place: known[place][name])
+        above = sum(one[name] <= cut for one in known)
+        if 0 < above < len(order):
+            pair = frames[[order[above - 1], order[above]]].astype(np.int64)
+            found += _edge(pair, values, name, cut)
+    return np.array(found, frames.dtype)
 
 
-def cuts_of(model: Model) -> list[tuple[int, float]]:
-    """Return where a model changes its mind: the place of a variable, and a value."""
+def _edge(
+    pair: Whole, values: Callable[[Whole], Mapping[str, float]], name: str, cut: float
+) -> Iterator[Whole]:
+    """Yield two frames next to each other, on the way from one frame to another.
+
+    All cells go over one after another, by one at each step.
+    """
+    start, turn = pair[0], np.sign(pair[1] - pair[0])
+    steps = np.abs(pair[1] - pair[0])
+    before = np.cumsum(steps).reshape(steps.shape) - steps
+
+    def frame(step: int) -> Whole:
+        found: Whole = start + turn * np.clip(step - before, 0, steps)
+        return found
+
+    every = range(int(steps.sum()) + 1)
+    first = bisect.bisect(every, cut, key=lambda step: values(frame(step))[name])
+    yield from (frame(first - 1), frame(first))
+
+
+def _cuts(model: Model) -> list[tuple[str, float]]:
+    """Return where a model changes its mind: the name of a variable, and a value."""
     if isinstance(model, FuzzyTree):
-        place = {one.name: line for line, one in enumerate(model.variables)}
-        pairs = [(place[one.variable], cut) for one in model.nodes for cut in one.cuts]
+        found = [(one.variable, cut) for one in model.nodes for cut in one.cuts]
     else:
-        pairs = [
-            (line, value)
-            for line, variable in enumerate(model.variables)
-            for term in variable.terms
-            for value in landmarks(term.shape)
-        ]
-    return list(dict.fromkeys(pairs))
+        terms = [(one.name, term) for one in model.variables for term in one.terms]
+        found = [(n, value) for n, term in terms for value in landmarks(term.shape)]
+    return list(dict.fromkeys(found))
