@@ -38,6 +38,7 @@ from fuzzytree.tactile.recognition.runners import (
     C,
     Runner,
     as_sent,
+    plain_runner,
     runners,
 )
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
@@ -144,6 +145,7 @@ def time_frames(
         raise ValueError("there is no frame to measure with")
     before = machine(["onnx", "onnxruntime"])
     ways, omissions = runners(model, sensor, reject)
+    ways[PLAIN] = plain_runner(model, sensor, reject)
     steps, sizes = _steps(model, sensor, reject, ways)
     judged = _judged(model, sensor, given, ways, reject)
     if STRENGTHS in steps:

@@ -19,7 +19,6 @@ from .onnx_compare import Contents as Contents
 from .onnx_compare import Differences as Differences
 from .onnx_compare import contents as contents
 from .onnx_compare import differences as differences
-from .onnx_compare import proto_differences as proto_differences
 from .onnx_ends import InputBlock as InputBlock
 from .onnx_ends import add_winner as add_winner
 from .onnx_ends import is_known as is_known

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
@@ -17,7 +17,7 @@ import msgspec
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.exporters.onnx_graph import TREES
-from fuzzytree.model import FuzzySystem, Model, fingerprint
+from fuzzytree.model import FuzzySystem, FuzzyTree, Model, Written, fingerprint
 
 if TYPE_CHECKING:
     import onnx
@@ -46,38 +46,52 @@ class Differences(NamedTuple):
     metadata: tuple[str, ...]
 
 
-def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
-    """Return how a file differs from one that is written of a model now."""
+def differences(
+    content: bytes,
+    model: Model | FuzzySystem,
+    write: Callable[..., Written] | None = None,
+    **options: object,
+) -> Differences:
+    """Return how a file differs from one that is written of a model now.
+
+    Args:
+        content: The file.
+        model: What it should be of.
+        write: Writes it; `write_onnx`, with the options that the file states, if None.
+        options: Of `write`, beside outputs, opset, ir and plain.
+    """
     import onnx
 
     result = onnx.load_model_from_string(content)
     facts = {p.key.removeprefix("fuzzytree."): p.value for p in result.metadata_props}
     versions = {entry.domain: entry.version for entry in result.opset_import}
-    columns = json.loads(facts["columns"])
-    needed = model.inputs
+    if write is None:
+        needed = json.loads(facts["columns"]) == list(model.inputs)
+        write, options = (
+            write_onnx,
+            {
+                "allow_loss": True,
+                "dtype": facts["dtype"],
+                "signature": "needed" if needed else "all",
+                "readable": facts.get("form") == "readable",
+                "verify": False,
+            },
+        )
     try:
-        fresh = write_onnx(
+        fresh = write(
             model,
-            allow_loss=True,
-            dtype=facts["dtype"],  # pyright: ignore[reportArgumentType]  # write checks it
+            outputs=[entry.name for entry in result.graph.output],
             opset=versions.get("", 0),
             ir=result.ir_version,
-            signature="needed" if columns == list(needed) else "all",
-            outputs=json.loads(facts["outputs"]),
-            readable=facts.get("form") == "readable",
-            plain=facts["carrier"] == "tree" and TREES not in versions,
-            verify=False,
+            plain=isinstance(model, FuzzyTree) and TREES not in versions,
+            **options,
         )
     except (ValueError, LossError) as error:  # it states what is not written now
-        stated, right = facts["fingerprint"], fingerprint(model)
+        stated, right = facts.get("fingerprint", ""), fingerprint(model)
         faults = [] if stated == right else [_stated(_FINGERPRINT, stated, right)]
         return Differences((str(error),), tuple(faults))
-    return proto_differences(onnx.load_model_from_string(fresh.content), result)
-
-
-def proto_differences(fresh: onnx.ModelProto, result: onnx.ModelProto) -> Differences:
-    """Return how a file differs from a fresh one in graph and metadata."""
-    return Differences(tuple(_graph(fresh, result)), tuple(_metadata(fresh, result)))
+    proto = onnx.load_model_from_string(fresh.content)
+    return Differences(tuple(_graph(proto, result)), tuple(_metadata(proto, result)))
 
 
 def _graph(fresh: onnx.ModelProto, result: onnx.ModelProto) -> Iterator[str]:

@@ -14,6 +14,7 @@ from fuzzytree.cli import (
     rows_only_option,
     say,
     takes,
+    wrong_options,
 )
 from fuzzytree.tactile.cli.sensors import (
     SensorOptions,
@@ -49,18 +50,19 @@ def command(options: TactileCheckOptions) -> int:
     from fuzzytree.files import read_bounded
     from fuzzytree.report import agreement_lines, agreement_verdict
     from fuzzytree.tactile.presses import read_frames
-    from fuzzytree.tactile.recognition.onnx_files import check_onnx_files
+    from fuzzytree.tactile.recognition.checking import check_frames
 
     settings = (options.board, options.size, options.full, options.threshold)
     is_named = settings != (None,) * 4
-    found = check_onnx_files(
-        frames_model(options.model),
-        {name: read_bounded(name) for name in options.files},
-        None if options.data is None else read_frames(options.data).frames,
-        sensor=sensor_of_options(options) if is_named else None,
-        reject=options.reject,
-        rows_only=options.rows_only,
-    )
+    with wrong_options():
+        found = check_frames(
+            frames_model(options.model),
+            sensor_of_options(options) if is_named else None,
+            None if options.data is None else read_frames(options.data).frames,
+            files={name: read_bounded(name) for name in options.files},
+            reject=options.reject,
+            rows_only=options.rows_only,
+        )
     if options.as_json:
         answer_json({"check": found, "ok": found.ok})
         say(agreement_verdict(found), quiet=options.quiet and found.ok)

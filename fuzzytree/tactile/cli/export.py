@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import click
 
@@ -31,10 +31,7 @@ from fuzzytree.tactile.cli.sensors import (
     sensor_of_options,
 )
 
-if TYPE_CHECKING:
-    from fuzzytree.tactile.recognition.agreement import FramesAgreement
-
-    Form = Literal["onnx", "c"]
+Form = Literal["onnx", "c"]
 
 _SUFFIXES: dict[str, Form] = {".onnx": "onnx", ".c": "c"}
 
@@ -65,9 +62,9 @@ def command(options: TactileExportOptions) -> int:
     stdout.
     """
     from fuzzytree.exporters import require
-    from fuzzytree.report import agreement_verdict
-    from fuzzytree.tactile.recognition.agreement import check_frames_agree
-    from fuzzytree.tactile.recognition.recogniser import check_inputs
+    from fuzzytree.report import agreement_lines, agreement_verdict
+    from fuzzytree.tactile.recognition.checking import check_frames
+    from fuzzytree.tactile.recognition.recogniser import Recogniser, State, check_inputs
 
     form = _form(options.output, options.to)
     write, values = _writer(form, options.settings)
@@ -82,16 +79,26 @@ def command(options: TactileExportOptions) -> int:
     with wrong_options():
         written = write(source, sensor, **values)
         reject = values.get("reject", 0.0)
-        graph = written.content if form == "onnx" else None
-        found = check_frames_agree(source, sensor, frames, reject=reject, graph=graph)
-    lines = _lines(found)
+        graphs = {form: written.content} if form == "onnx" else None
+        found = check_frames(source, sensor, frames, files=graphs, reject=reject)
+    lines, shown = [*agreement_lines(found)], {}
+    if frames is not None:
+        seen = Recogniser(source, sensor, reject)(frames)
+        shown = {
+            "frames": len(frames),
+            "empty": int((seen.states == State.NOTHING).sum()),
+            "unknown": int((seen.states == State.UNKNOWN).sum()),
+            "saturated": int((seen.saturated > 0).sum()),
+        }
+        text = ", ".join(f"{count} {name}" for name, count in shown.items())
+        lines.append(f"{options.data}: {text}")
     if options.output == "-":
         for line in lines:
             say(line, quiet=options.quiet)
     elif options.as_json:
         size = len(written.content)
         facts = {"file": options.output, "format": form, "bytes": size}
-        answer_json({**facts, "check": found, "ok": found.ok})
+        answer_json({**facts, "check": found, "shown": shown, "ok": found.ok})
     else:
         answer("\n".join(lines))
     if not found.ok:
@@ -115,19 +122,6 @@ def _form(output: str, to: Form | None) -> Form:
         known = " or ".join(_SUFFIXES)
         raise click.UsageError(f"{output}: a file from frame to class ends in {known}")
     return _SUFFIXES[suffix]
-
-
-def _lines(found: FramesAgreement) -> Iterator[str]:
-    """Yield a check of frames: its verdict, the comparisons, and what frames show."""
-    from fuzzytree.report import agreement_lines, counted
-
-    yield from agreement_lines(found)
-    shown = found.shown
-    yield (
-        f"{counted(shown.frames, 'frame')}: {shown.aimed} aimed at bounds and cuts, "
-        f"{shown.nothing} empty, {shown.unknown} of unknown objects, "
-        f"{shown.saturated} saturated, {shown.ties} tied"
-    )
 
 
 def _writer(form: Form, settings: Sequence[str]) -> tuple[Any, dict[str, Any]]:

@@ -1,11 +1,11 @@
-"""Ways from raw frame to class, alike to call: numpy, ONNX, C and plain Python."""
+"""Ways from raw frame to class, alike to call: plain Python, numpy, C and ONNX."""
 
 from __future__ import annotations
 
 import importlib.util
 import shutil
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
@@ -13,11 +13,7 @@ from fuzzytree.errors import ReadError, install_hint
 from fuzzytree.model import Model
 from fuzzytree.runtimes import COMPILERS, compiled, loaded
 from fuzzytree.tactile.exporters.c_frames import write_frames_c
-from fuzzytree.tactile.exporters.onnx_frames import (
-    Output,
-    frames_at_once,
-    write_frames,
-)
+from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.plain import plain_shown
 from fuzzytree.tactile.recognition.recogniser import Recogniser
@@ -34,7 +30,7 @@ Answers = Mapping[Output, "npt.NDArray[Any]"]
 """What frames show: some outputs of a graph of frames, each with an entry a frame."""
 
 Runner = Callable[[Cells], Answers]
-"""Returns the answers to frames. Raises TableError if they do not fit."""
+"""Returns the answers to frames of the sensor's type, which lie in C order."""
 
 
 def as_sent(sensor: Sensor, frames: Cells) -> Cells:
@@ -54,42 +50,64 @@ def as_sent(sensor: Sensor, frames: Cells) -> Cells:
 
 
 def runners(
-    model: Model, sensor: Sensor, reject: float = 0.0, *, graph: bytes | None = None
+    model: Model,
+    sensor: Sensor,
+    reject: float = 0.0,
+    files: Mapping[str, bytes] | None = None,
 ) -> tuple[dict[str, Runner], list[str]]:
-    """Return the ways that can run here, numpy first, and what is missing for others.
+    """Return the ways that can run here, by name, and a sentence for each other one.
 
     Args:
         model: A tree or a rule base whose inputs are names of features.
         sensor: Whose frames come.
         reject: As `fuzzytree.tactile.recognition.recogniser.Recogniser`.
-        graph: The ONNX file to run; one that is written now if None.
+        files: ONNX files to run, by name; one that is written now if there are none.
 
-    Returns:
-        The runners by name, and a sentence for each that cannot run.
+    Raises:
+        ReadError: If onnxruntime does not load a file.
     """
-    found = {NUMPY: _numpy(model, sensor, reject)}
-    missing: list[str] = []
-    if all(map(importlib.util.find_spec, ("onnx", "onnxruntime"))):
-        content = graph
-        if content is None:
-            written = write_frames(model, sensor, outputs=_OUTPUTS, reject=reject)
-            content = written.content
-        found[ONNX] = graph_runner(content, f"{model.name} as onnx", sensor)
-    else:
-        missing.append(f"onnx: not installed ({install_hint('onnx')})")
+    found, missing = {NUMPY: _numpy(model, sensor, reject)}, list[str]()
     if any(map(shutil.which, COMPILERS)):
         found[C] = _c(model, sensor, reject)
     else:
         missing.append(f"c: no compiler is installed ({', '.join(COMPILERS)})")
-    found[PLAIN] = plain_runner(model, sensor, reject)
+    if not all(map(importlib.util.find_spec, ("onnx", "onnxruntime"))):
+        missing.append(f"onnx: not installed ({install_hint('onnx')})")
+    elif not files:
+        written = write_frames(model, sensor, outputs=_OUTPUTS, reject=reject)
+        files = {ONNX: written.content}
+    for name, content in (files or {}).items():
+        found[name] = _graph(content, name)
     return found, missing
+
+
+def plain_runner(model: Model, sensor: Sensor, reject: float) -> Runner:
+    """Return the reference of the others."""
+    made, labels = frame_program(sensor, model.inputs), [*model.classes, ""]
+
+    def run(frames: Cells) -> Answers:
+        shown = [plain_shown(made, model, frame, reject) for frame in frames]
+        return {
+            "label": np.array([labels[one.code] for one in shown], np.object_),
+            "state": np.array([one.state for one in shown], np.int64),
+            "rule": np.array([one.rule for one in shown], np.int64),
+            "features": np.array([one.features for one in shown], np.float64),
+            "strengths": np.array([one.strengths for one in shown], np.float64),
+        }
+
+    return run
+
+
+def _labels(model: Model) -> npt.NDArray[np.object_]:
+    """Return the labels of codes; that of -1, the last one, is empty."""
+    return np.array([*model.classes, ""], np.object_)
 
 
 def _numpy(model: Model, sensor: Sensor, reject: float) -> Runner:
     recogniser, labels = Recogniser(model, sensor, reject), _labels(model)
 
     def run(frames: Cells) -> Answers:
-        found = recogniser(as_sent(sensor, frames))
+        found = recogniser(frames)
         return {
             "label": labels[found.codes],
             "state": found.states,
@@ -100,64 +118,34 @@ def _numpy(model: Model, sensor: Sensor, reject: float) -> Runner:
     return run
 
 
-def plain_runner(model: Model, sensor: Sensor, reject: float) -> Runner:
-    """Return the reference of the others."""
-    made, labels = frame_program(sensor, model.inputs), _labels(model)
-
-    def run(frames: Cells) -> Answers:
-        sent = as_sent(sensor, frames)
-        shown = [plain_shown(made, model, frame, reject) for frame in sent]
-        codes = np.array([one.code for one in shown], np.int64)
-        return {
-            "label": labels[codes],
-            "state": np.array([one.state for one in shown], np.int64),
-            "rule": np.array([one.rule for one in shown], np.int64),
-            "features": _table([one.features for one in shown]),
-            "strengths": _table([one.strengths for one in shown]),
-        }
-
-    return run
-
-
-def _table(rows: Sequence[tuple[float, ...]]) -> npt.NDArray[np.float64]:
-    width = len(rows[0]) if rows else 0
-    return np.array(rows, np.float64).reshape(len(rows), width)
-
-
-def _labels(model: Model) -> npt.NDArray[np.object_]:
-    """Return the labels of codes; that of -1, the last one, is empty."""
-    return np.array([*model.classes, ""], np.object_)
-
-
-def graph_runner(content: bytes, name: str, sensor: Sensor) -> Runner:
+def _graph(content: bytes, name: str) -> Runner:
     """Return what runs an ONNX file of frames, all of its outputs.
 
     Raises:
-        ReadError: If onnxruntime does not load the file; the runner raises it if
-            onnxruntime does not run it, or if it has no answer for a frame.
+        ReadError: If it takes or gives something else, or onnxruntime does not load it;
+            the runner raises it if onnxruntime does not run it, or if it has no answer
+            for a frame.
     """
     import onnx
 
     from fuzzytree.exporters import RUNTIME_ERRORS, first_line
 
-    bare, step = loaded(content, name), frames_at_once(sensor)
-    proto = onnx.load_model_from_string(content)
+    bare, proto = loaded(content, name), onnx.load_model_from_string(content)
     outputs: list[Any] = [entry.name for entry in proto.graph.output]
+    is_known = 0 < len(outputs) == len({*outputs} & {*get_args(Output)})
+    if not is_known or [entry.name for entry in proto.graph.input] != ["frames"]:
+        text = "the graph's inputs and outputs are not those of frames"
+        raise ReadError(f"{name}: {text}")
 
     def run(frames: Cells) -> Answers:
-        sent = as_sent(sensor, frames)
-        parts = [sent[k : k + step] for k in range(0, max(len(sent), 1), step)]
         try:
-            found = [bare(outputs, {"frames": part}) for part in parts]
+            found = [*map(np.asarray, bare(outputs, {"frames": frames}))]
         except RUNTIME_ERRORS as error:
             text = f"{name}: onnxruntime does not run it: {first_line(error)}"
             raise ReadError(text) from error
-        pieces = [[*map(np.asarray, one)] for one in found]
-        for part, piece in zip(parts, pieces, strict=True):
-            if any(one.shape[:1] != (len(part),) for one in piece):
-                raise ReadError(f"{name}: it does not give an answer for each frame")
-        arrays: list[Any] = list(map(np.concatenate, zip(*pieces, strict=True)))
-        return dict(zip(outputs, arrays, strict=True))
+        if any(one.shape[:1] != (len(frames),) for one in found):
+            raise ReadError(f"{name}: it does not give an answer for each frame")
+        return dict(zip(outputs, found, strict=True))
 
     return run
 
@@ -188,11 +176,10 @@ def _c(model: Model, sensor: Sensor, reject: float) -> Runner:
     many, labels = compiled(content, LOOP, 4), _labels(model)
 
     def run(frames: Cells) -> Answers:
-        sent = as_sent(sensor, frames)
-        features = np.empty((len(sent), len(model.inputs)))
-        codes, state, rule = found = np.empty((3, len(sent)), np.int64)
+        features = np.empty((len(frames), len(model.inputs)))
+        codes, state, rule = found = np.empty((3, len(frames)), np.int64)
         ends = [array.ctypes.data for array in (features, *found)]
-        many(sent.ctypes.data, len(sent), *ends)
+        many(frames.ctypes.data, len(frames), *ends)
         label = labels[codes]
         return {"label": label, "state": state, "rule": rule, "features": features}
 

@@ -41,9 +41,9 @@ def test_a_graph_is_checked_and_written(capsys: Said) -> None:
     assert main(words) == 0
     out, err = capsys.readouterr()
     lines = out.splitlines()
-    assert lines[0].startswith("tree: none of 8 comparisons disagrees (")
+    assert lines[0].startswith("tree: none of 5 comparisons disagrees (")
     assert lines[1].split()[:2] == ["compared", "with"]
-    assert "4 empty" in out  # three are made
+    assert lines[-1].startswith("f.npz: 9 frames, 1 empty, 0 unknown, ")
     assert "plain Python" in lines[2]
     assert all(line.endswith("agree") for line in lines[2:5])
     content = Path("pad.onnx").read_bytes()
@@ -72,12 +72,12 @@ def test_c_goes_to_standard_output(capfdbinary: pytest.CaptureFixture[bytes]) ->
 
 
 def test_facts_for_programs(capsys: Said) -> None:
-    words = ["tactile", "export", "tree.yaml", "pad.c", *SIZE, "--json", "--quiet"]
-    assert main(words) == 0
+    words = ["tactile", "export", "tree.yaml", "pad.c", *SIZE, "--data", "f.npz"]
+    assert main([*words, "--json", "--quiet"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["ok"] is True
     assert found["bytes"] == Path("pad.c").stat().st_size
-    assert found["check"]["shown"]["nothing"] == 3
+    assert found["shown"]["empty"] == 1
 
 
 def test_nothing_is_written_where_a_way_disagrees(
@@ -90,7 +90,7 @@ def test_nothing_is_written_where_a_way_disagrees(
     words = ["tactile", "export", "tree.yaml", "pad.onnx", *SIZE]
     assert main(words) == 1
     assert (
-        capsys.readouterr().err == "2 of 8 comparisons disagree; nothing is written\n"
+        capsys.readouterr().err == "3 of 5 comparisons disagree; nothing is written\n"
     )
     assert not Path("pad.onnx").exists()
 

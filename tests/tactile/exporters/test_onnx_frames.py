@@ -18,8 +18,7 @@ from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import aimed_frames, proving_frames
 from fuzzytree.tactile.features.plain import plain_features
-from fuzzytree.tactile.recognition.agreement import check_frames_agree
-from fuzzytree.tactile.recognition.onnx_files import check_onnx_files
+from fuzzytree.tactile.recognition.checking import check_frames
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.testing import random_tree
@@ -156,7 +155,7 @@ def test_operator_sets_give_the_same_answers(opset: int) -> None:
     tree = learnt_tree(SMALL, MIXED)
     ir = 8 if opset < 20 else 10
     content = write_frames(tree, SMALL, opset=opset, ir=ir, outputs=ALL).content
-    assert check_onnx_files(tree, {"small.onnx": content}, sensor=SMALL).ok
+    assert check_frames(tree, SMALL, files={"small.onnx": content}).ok
 
 
 def test_a_model_of_one_leaf_reports_something_from_nothing() -> None:
@@ -180,13 +179,11 @@ def _one_leaf() -> FuzzyTree:
 def test_the_check_finds_a_file_of_another_model() -> None:
     other = learnt_tree(PLAIN, ("S9", "area"))
     content = write_frames(other, PLAIN, outputs=ALL).content
-    found = check_frames_agree(TREE, PLAIN, graph=content)
-    wrong = [one for one in found.comparisons if one.verdict == "DISAGREES"]
-    assert [(one.representation, one.against) for one in wrong] == [
-        ("onnx", "numpy"),
-        ("onnx", "plain Python"),
-    ]
-    assert wrong[1].detail[0].startswith("frame 2: label ")
+    found = check_frames(TREE, PLAIN, files={"pad.onnx": content})
+    assert [(one.representation, one.verdict) for one in found.wrong] == [
+        ("pad.onnx", "DISAGREES")
+    ] * 3
+    assert found.wrong[2].detail[0].startswith("frame 2: label ")
 
 
 def test_frames_to_prove_with_lie_on_either_side_of_each_cut() -> None:

@@ -17,7 +17,7 @@ from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.names import FEATURES, LOG, PER_FORCE, feature_of
 from fuzzytree.tactile.features.plain import plain_answer, plain_features
-from fuzzytree.tactile.recognition.agreement import check_frames_agree
+from fuzzytree.tactile.recognition.checking import check_frames
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor
@@ -104,7 +104,7 @@ def test_every_way_from_frame_to_class_is_one(seed: int) -> None:
             settings=LearningSettings(mode=mode),
         )
         model, reject = random_model(draw, tree)
-        agreement = check_frames_agree(model, sensor, frames, reject=reject)
+        agreement = check_frames(model, sensor, frames, reject=reject)
         assert agreement.ok, agreement
         answers = Recogniser(model, sensor, reject)(frames)
         lines = [names.index(name) for name in model.inputs]
