@@ -4,6 +4,7 @@ from .c import write_c as write_c
 from .c_steps import LIBRARY as LIBRARY
 from .c_steps import CSteps as CSteps
 from .c_text import DOUBLE as DOUBLE
+from .c_text import bits_of as bits_of
 from .c_text import fill as fill
 from .c_text import remark as remark
 from .c_text import whole_lines as whole_lines
@@ -12,14 +13,15 @@ from .onnx import FORMAT_VERSION as FORMAT_VERSION
 from .onnx import Output as Output
 from .onnx import check_outputs as check_outputs
 from .onnx import check_versions as check_versions
+from .onnx import facts_of as facts_of
 from .onnx import require as require
-from .onnx import version as version
 from .onnx import write_onnx as write_onnx
 from .onnx_compare import Contents as Contents
 from .onnx_compare import Differences as Differences
 from .onnx_compare import contents as contents
 from .onnx_compare import differences as differences
 from .onnx_ends import InputBlock as InputBlock
+from .onnx_ends import add_strengths as add_strengths
 from .onnx_ends import add_winner as add_winner
 from .onnx_ends import is_known as is_known
 from .onnx_graph import TREES as TREES
@@ -33,10 +35,12 @@ from .onnx_session import first_line as first_line
 from .onnx_session import open_bare as open_bare
 from .onnx_steps import add_steps as add_steps
 from .onnx_steps import reduced as reduced
+from .onnx_steps import side_by_side as side_by_side
 from .onnx_tree import needs_plain as needs_plain
 from .onnx_tree import tree_graph as tree_graph
 from .plugins import Plugin as Plugin
 from .plugins import all_plugins as all_plugins
+from .program_text import answer_of as answer_of
 from .python import write_python as write_python
 from .table import TABLE as TABLE
 from .table import all_formats as all_formats

@@ -343,15 +343,6 @@ def _facts(
         inputs, classes = model.inputs, model.classes
         semantics = msgspec.to_builtins(model.semantics)
         kind = "descent" if isinstance(model, FuzzyTree) else model.kind or kind
-    texts = {
-        "format": FORMAT_VERSION,
-        "version": version(),
-        "name": model.name,
-        "carrier": kind_of(model),
-        "kind": kind,
-        "dtype": dtype,
-        "fingerprint": fingerprint(model),
-    }
     units = {one.name: one.unit for one in model.variables if one.name in inputs}
     records: dict[str, object] = {
         "columns": list(columns),
@@ -367,8 +358,25 @@ def _facts(
         records["categories"] = known
     if stand := stand_ins(model.variables):
         records["stand_ins"] = stand
-    return texts | {
-        key: json.dumps(value, ensure_ascii=False) for key, value in records.items()
+    return facts_of(model, kind_of(model), records, kind=kind, dtype=dtype)
+
+
+def facts_of(
+    model: Model | FuzzySystem,
+    carrier: str,
+    records: Mapping[str, object],
+    /,
+    **texts: str,
+) -> dict[str, str]:
+    """Return metadata: what every file states, other texts, and records as JSON."""
+    return {
+        "format": FORMAT_VERSION,
+        "version": version(),
+        "name": model.name,
+        "carrier": carrier,
+        **texts,
+        "fingerprint": fingerprint(model),
+        **{k: json.dumps(v, ensure_ascii=False) for k, v in records.items()},
     }
 
 

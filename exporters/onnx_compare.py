@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
@@ -50,7 +50,7 @@ def differences(
     content: bytes,
     model: Model | FuzzySystem,
     write: Callable[..., Written] | None = None,
-    **options: object,
+    **options: Any,
 ) -> Differences:
     """Return how a file differs from one that is written of a model now.
 

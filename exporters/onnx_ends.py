@@ -134,10 +134,14 @@ def _direct(model: Model) -> tuple[str, ...]:
     return tuple(n for n in model.inputs if n in used or n not in guarded)
 
 
-def is_known(graph: OnnxGraph, frame: InputBlock) -> str:
-    """Return whether all values of a row are finite, in the guard's shape."""
+def is_known(graph: OnnxGraph, frame: InputBlock, *, is_flat: bool = False) -> str:
+    """Return whether all values of a row are finite, flat or in the guard's shape."""
     zero = graph.number(0.0, graph.types.axis)
-    return graph.node("Equal", frame.guard, zero, hint="is_row_finite")
+    known = graph.node("Equal", frame.guard, zero, hint="is_row_finite")
+    if not is_flat:
+        return known
+    shape = graph.numbers([-1], "flat")
+    return graph.node("Reshape", known, shape, hint="is_row_finite")
 
 
 def _no_guard(graph: OnnxGraph, kind: type[RealKind], *, is_flat: bool) -> str:
@@ -232,12 +236,21 @@ def add_rule_outputs(
         with graph.about("probabilities"):
             _add_probabilities(graph, rules, strengths, winner)
     if "strengths" in outputs:
-        ends = [graph.numbers([end], "end") for end in (1, 1 + len(rules.rules))]
         with graph.about("strengths"):
-            real = graph.node("Slice", strengths, *ends, graph.numbers([0], "axes"))
-            unknown = graph.number(np.nan, graph.types.degree)
-            real = graph.node("Where", is_known(graph, frame), real, unknown)
-        graph.node("Transpose", real, perm=[1, 0], named="strengths")
+            known = is_known(graph, frame)
+        add_strengths(graph, len(rules.rules), strengths, known, np.nan)
+
+
+def add_strengths(
+    graph: OnnxGraph, rules: int, strengths: str, known: str, other: float
+) -> None:
+    """Add the strengths of all rules, and another number in rows that are not known."""
+    ends = [graph.numbers([end], "end") for end in (1, 1 + rules)]
+    with graph.about("strengths"):
+        real = graph.node("Slice", strengths, *ends, graph.numbers([0], "axes"))
+        unknown = graph.number(other, graph.types.degree)
+        real = graph.node("Where", known, real, unknown)
+    graph.node("Transpose", real, perm=[1, 0], named="strengths")
 
 
 def _add_probabilities(
@@ -293,7 +306,7 @@ def _add_label(
     if semantics.missing != semantics.uncovered:
         missing = graph.whole(len(labels))
         labels.append(semantics.missing or "")
-        known = _flat(graph, frame)
+        known = is_known(graph, frame, is_flat=True)
         position = graph.node("Where", known, winner, missing, hint="label_number")
     table = graph.texts(labels, "labels")
     graph.node("Gather", table, position, axis=0, named="label")
@@ -319,10 +332,6 @@ def _add_status(
     status = graph.node("Where", is_one, decided, tie, hint="tie_status")
     is_none = graph.node("Equal", winner, graph.whole(0), hint="is_uncovered")
     status = graph.node("Where", is_none, uncovered, status, hint="status_if_known")
-    graph.node("Where", _flat(graph, frame), status, missing, named="status")
-
-
-def _flat(graph: OnnxGraph, frame: InputBlock) -> str:
-    known = is_known(graph, frame)
-    shape = graph.numbers([-1], "flat")
-    return graph.node("Reshape", known, shape, hint="is_row_finite")
+    graph.node(
+        "Where", is_known(graph, frame, is_flat=True), status, missing, named="status"
+    )

@@ -618,7 +618,7 @@ def program_graph(
             block = blocks.rows(program.of(kind))
             graph.node("Transpose", block, perm=[1, 0], named=name)
         elif name in outputs:
-            _columns(graph, [single(place) for place in program.of(kind)], name)
+            side_by_side(graph, [single(place) for place in program.of(kind)], name)
     whole = np_to_onnx(np.int64)
     for name, kind in _WHOLE.items():
         if name in outputs:
@@ -629,17 +629,14 @@ def program_graph(
         graph.node("Gather", table, place, axis=0, named="label")
 
 
-def _columns(graph: OnnxGraph, names: Sequence[str], named: str) -> None:
+def side_by_side(graph: OnnxGraph, names: Sequence[str], named: str) -> None:
     """Put blocks of shape (rows,) side by side."""
     if len(names) == 1:
         graph.node("Reshape", names[0], graph.numbers([-1, 1], "shape"), named=named)
         return
-    line = graph.numbers([0], "axes")
-    if graph.opset >= 13:
-        lines = [graph.node("Unsqueeze", name, line, hint=name) for name in names]
-    else:
-        lines = [graph.node("Unsqueeze", name, hint=name, axes=[0]) for name in names]
-    block = graph.node("Concat", *lines, hint=named, axis=0)
+    block = graph.node("Concat", *names, hint=named, axis=0)
+    shape = graph.numbers([len(names), -1], "shape")
+    block = graph.node("Reshape", block, shape, hint=named)
     graph.node("Transpose", block, perm=[1, 0], named=named)
 
 

@@ -14,5 +14,6 @@ from .console import setting as setting
 from .console import several as several
 from .console import takes as takes
 from .console import wrong_options as wrong_options
+from .convert import option_values as option_values
 from .program import Verbs as Verbs
 from .program import main as main

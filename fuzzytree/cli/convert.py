@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -82,7 +82,7 @@ def command(options: ConvertOptions) -> int:
     ]
     form = wanted_format(options.output, options.to)
     with wrong_options():
-        values = _values(form, given)
+        values = option_values(form, given)
     found, used = read_source(options.source, options.read_as)
     head = f"{used}: {document_text(found.model)}"
     notes = [("read", options.source, head)]
@@ -91,7 +91,10 @@ def command(options: ConvertOptions) -> int:
     )
 
 
-def _values(form: Format, given: Sequence[tuple[str, str | None]]) -> dict[str, Option]:
+def option_values(
+    form: Format, given: Iterable[tuple[str, str | None]]
+) -> dict[str, Option]:
+    """Return the options of a writer that a user set, each at most once."""
     from fuzzytree.model import option_value
 
     options: dict[str, Option] = {}

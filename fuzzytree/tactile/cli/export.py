@@ -79,7 +79,7 @@ def command(options: TactileExportOptions) -> int:
     with wrong_options():
         written = write(source, sensor, **values)
         reject = values.get("reject", 0.0)
-        graphs = {form: written.content} if form == "onnx" else None
+        graphs = {"onnx": written.content} if form == "onnx" else None
         found = check_frames(source, sensor, frames, files=graphs, reject=reject)
     lines, shown = [*agreement_lines(found)], {}
     if frames is not None:
@@ -126,17 +126,12 @@ def _form(output: str, to: Form | None) -> Form:
 
 def _writer(form: Form, settings: Sequence[str]) -> tuple[Any, dict[str, Any]]:
     """Return the writer of a form, and its options from `--set`."""
-    from fuzzytree.model import Format, option_value
+    from fuzzytree.cli import option_values
+    from fuzzytree.model import Format
     from fuzzytree.tactile.exporters.c_frames import write_frames_c
     from fuzzytree.tactile.exporters.onnx_frames import write_frames
 
     write: Any = write_frames_c if form == "c" else write_frames
     known = Format(form, (f".{form}",), ("tree", "rules"), write)  # for its options
-    found: dict[str, Any] = {}
-    for text in settings:
-        name, value = setting(text)
-        if name in found:
-            raise click.UsageError(f"the option {name!r} is stated twice")
-        with wrong_options():
-            found[name] = option_value(known, name, value)
-    return write, found
+    with wrong_options():
+        return write, option_values(known, map(setting, settings))

@@ -8,7 +8,6 @@ of a library, and only where an angle, a direction or a logarithm needs it.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator, Sequence
 
 from fuzzytree.exporters import (
@@ -17,6 +16,7 @@ from fuzzytree.exporters import (
     CFile,
     CSteps,
     beginning,
+    bits_of,
     fill,
     remark,
     whole_lines,
@@ -366,7 +366,6 @@ def _example(
 ) -> Iterator[str]:
     shown = plain_shown(made, model, frame, reject)
     values = shown.features
-    bits = struct.unpack(f"<{len(values)}Q", struct.pack(f"<{len(values)}d", *values))
-    words = ", ".join(f"UINT64_C({one:#018x})" for one in (*bits, 0))
     yield f"    /* {', '.join(map(repr, values)) or 'no features'} */\n"
-    yield f"    {{{{{words}}}, {shown.code}, {int(shown.state)}, {shown.rule}}},\n"
+    ends = f"{shown.code}, {int(shown.state)}, {shown.rule}"
+    yield f"    {{{bits_of(values)}, {ends}}},\n"

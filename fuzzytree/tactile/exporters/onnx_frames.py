@@ -11,20 +11,13 @@ rounding, so whatever order a library adds in, the sums have the same bits.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from fuzzytree.exporters import (
-    FORMAT_VERSION,
-    check_outputs,
-    check_versions,
-    require,
-    version,
-)
-from fuzzytree.model import FuzzyTree, Model, RuleBase, Written, fingerprint, kind_of
+from fuzzytree.exporters import check_outputs, check_versions, facts_of, require
+from fuzzytree.model import FuzzyTree, Model, RuleBase, Written, kind_of
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.plain import State, check_reject
 from fuzzytree.tactile.sensor import Sensor, offsets
@@ -143,15 +136,6 @@ def _facts(
     import msgspec
 
     sensor = made.sensor
-    texts = {
-        "format": FORMAT_VERSION,
-        "version": version(),
-        "name": model.name,
-        "carrier": "frames",
-        "model": kind_of(model),
-        "dtype": "float64",
-        "fingerprint": fingerprint(model),
-    }
     records: dict[str, object] = {
         "sensor": msgspec.to_builtins(sensor),
         "features": list(made.features),
@@ -161,9 +145,7 @@ def _facts(
         "outputs": list(outputs),
         "chunk": frames_at_once(sensor),
     }
-    return texts | {
-        key: json.dumps(value, ensure_ascii=False) for key, value in records.items()
-    }
+    return facts_of(model, "frames", records, model=kind_of(model), dtype="float64")
 
 
 def _in_words(made: FrameProgram, model: Model) -> str:
@@ -190,7 +172,7 @@ def _fill(
     plain: bool,
 ) -> None:
     """Add all nodes of a graph to a sheet."""
-    from fuzzytree.exporters import add_steps, is_known
+    from fuzzytree.exporters import add_steps, add_strengths, is_known, side_by_side
 
     with sheet.about("sums"):
         columns = _sums(sheet, made)
@@ -198,7 +180,8 @@ def _fill(
     zero = sheet.number(0.0)
     is_pressed = sheet.node("Less", zero, pressed, hint="is_pressed")
     if features:
-        _side_by_side(sheet, features)
+        side_by_side(sheet, features, "features")
+        sheet.source = "features"
     elif "features" in outputs:  # a model that looks at nothing
         none = sheet.numbers([], "none")
         sheet.node("Gather", sheet.source, none, axis=1, named="features")
@@ -222,10 +205,10 @@ def _fill(
         is_strong = _is_strong(sheet, strengths, reject)
         known = sheet.node("And", known, is_strong, hint="is_known")
     _ends(sheet, model, is_pressed, known, outputs)
-    if "strengths" in outputs:
-        finite = _flat(sheet, is_known(sheet, axes))
+    if "strengths" in outputs and isinstance(model, RuleBase):
+        finite = is_known(sheet, axes, is_flat=True)
         finite = sheet.node("And", is_pressed, finite, hint="is_finite")
-        _all_strengths(sheet, model, strengths, finite)
+        add_strengths(sheet, len(model.rules), strengths, finite, 0.0)
 
 
 def _sums(sheet: OnnxGraph, made: FrameProgram) -> list[str]:
@@ -285,30 +268,13 @@ def _taken(
     return [one.name for one in (*mixed, *single, *others)]
 
 
-def _side_by_side(sheet: OnnxGraph, names: Sequence[str]) -> None:
-    """Put the features, of shape (frames,) each, side by side as the source."""
-    shape = [-1, 1] if len(names) == 1 else [len(names), -1]
-    block = names[0] if len(names) == 1 else sheet.node("Concat", *names, axis=0)
-    is_done = len(names) == 1
-    shaped = sheet.numbers(shape, "shape")
-    block = sheet.node("Reshape", block, shaped, named="features" if is_done else "")
-    if not is_done:
-        block = sheet.node("Transpose", block, perm=[1, 0], named="features")
-    sheet.source = block
-
-
-def _flat(sheet: OnnxGraph, truth: str) -> str:
-    shape = sheet.numbers([-1], "flat")
-    return sheet.node("Reshape", truth, shape, hint="is_row_finite")
-
-
 def _is_answer(sheet: OnnxGraph, model: Model, axes: InputBlock) -> str:
     """Return whether the model knows an answer to the features."""
     from fuzzytree.exporters import is_known
 
     semantics = model.semantics
     if isinstance(model, RuleBase) and semantics.uncovered is not None:
-        return _flat(sheet, is_known(sheet, axes))
+        return is_known(sheet, axes, is_flat=True)
     return sheet.node("Less", sheet.whole(0), "winner", hint="is_answer")
 
 
@@ -351,13 +317,3 @@ def _ends(
         place = sheet.node("Where", known, "winner", nothing, hint="label_number")
         table = sheet.texts(texts, "labels")
         sheet.node("Gather", table, place, axis=0, named="label")
-
-
-def _all_strengths(sheet: OnnxGraph, model: Model, strengths: str, finite: str) -> None:
-    """Add the strengths of all rules, 0 where nothing presses."""
-    count = len(model.rules) if isinstance(model, RuleBase) else 0
-    ends = [sheet.numbers([end], "end") for end in (1, 1 + count)]
-    with sheet.about("strengths"):
-        real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
-        real = sheet.node("Where", finite, real, sheet.number(0.0))
-    sheet.node("Transpose", real, perm=[1, 0], named="strengths")

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import IntEnum
 
+from fuzzytree.exporters import answer_of
 from fuzzytree.model import Model, RuleBase, Value
-from fuzzytree.semantics import Status, descend, evaluate
+from fuzzytree.semantics import Status
 from fuzzytree.semantics import evaluate_program as run
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.sensor import Cells, pressed
@@ -114,14 +115,8 @@ def plain_answer(
     if not is_pressed:
         fired = (0.0,) * len(model.rules) if isinstance(model, RuleBase) else ()
         return Shown(given, State.NOTHING, -1, 0, fired)
-    row = dict(zip(model.inputs, given, strict=True))
-    if isinstance(model, RuleBase):
-        answer = evaluate(model, row)
-    else:
-        answer = descend(model, row)
-    is_weak = bool(reject and answer.rule) and (
-        answer.strengths[answer.rule - 1] < reject
-    )
+    answer = answer_of(model, dict(zip(model.inputs, given, strict=True)))
+    is_weak = reject and answer.rule and answer.strengths[answer.rule - 1] < reject
     if is_weak or answer.label is None or answer.status == Status.MISSING:
         return Shown(given, State.UNKNOWN, -1, 0, answer.strengths)
     code = model.classes.index(answer.label)

@@ -110,7 +110,7 @@ def test_nothing_is_written_where_a_way_disagrees(
         (["pad.c", *SIZE, "--set", "opset=17"], "c has no option 'opset'; it has name, "
          "reject"),
         (["pad.onnx", *SIZE, "--set", "ir=8", "--set", "ir=9"], "the option 'ir' is "
-         "stated twice"),
+         "given twice"),
         (["pad.onnx", "--sensor", "4x6", "--data", "f.npz"], "f.npz: a frame of "
          "6 x 4 cells does not fit a sensor of 4 x 6"),
     ],

@@ -158,7 +158,8 @@ def stating(key: str, value: str) -> bytes:
     for entry in proto.metadata_props:
         if entry.key == f"fuzzytree.{key}":
             entry.value = value
-    return proto.SerializeToString()
+    content: bytes = proto.SerializeToString()
+    return content
 
 
 @pytest.mark.parametrize(
