@@ -8,7 +8,7 @@ of a library, and only where an angle, a direction or a logarithm needs it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from fuzzytree.exporters import (
     DOUBLE,
@@ -26,7 +26,7 @@ from fuzzytree.model import Model, Written
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.aimed import proving_frames
 from fuzzytree.tactile.features.plain import check_reject, plain_shown
-from fuzzytree.tactile.sensor import Cells, Sensor, offsets
+from fuzzytree.tactile.sensor import Sensor, offsets
 
 _PRESSES = 6  # in the self-test, beside aimed frames
 _CELLS, _FEWEST = 40_000, 6  # of its frames
@@ -175,12 +175,9 @@ def _text(
     steps = CSteps(made.program, _LIBRARY)
     ends = [*_features(made, steps)]
     yield "\n#include <math.h>\n" if steps.needs_library else ""
-    yield from (fill(text, prefix) for text in steps.helper_text())
-    yield from (fill(text, prefix) for text in _cells(sensor))
-    yield from (fill(text, prefix) for text in _sums(made))
-    yield from (fill(text, prefix) for text in ends)
-    yield fill(_recognise(reject), prefix)
-    yield from _selftest(made, model, prefix, reject)
+    parts: list[Iterable[str]] = [steps.helper_text(), _cells(sensor), _sums(made)]
+    parts += [ends, [_recognise(reject)], _selftest(made, model, reject)]
+    yield from (fill(text, prefix) for part in parts for text in part)
     yield "\n#endif\n"
 
 
@@ -336,36 +333,25 @@ def _features(made: FrameProgram, steps: CSteps) -> Iterator[str]:
 # --- the self-test
 
 
-def _selftest(
-    made: FrameProgram, model: Model, prefix: str, reject: float
-) -> Iterator[str]:
+def _selftest(made: FrameProgram, model: Model, reject: float) -> Iterator[str]:
     """Yield aimed frames with their answers, and a program that compares them."""
     frames = proving_frames(made, model, _PRESSES)
     size = made.sensor.rows * made.sensor.columns
     few = max(_FEWEST, _CELLS // size)  # a large sensor would make a file of megabytes
     frames = frames[:: -(-len(frames) // few)]
-    yield fill("\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n\n", prefix)
-    yield fill(
-        f"static const name_cell name_frame[{len(frames)}][{size}] = {{\n", prefix
-    )
+    yield "\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n\n"
+    yield f"static const name_cell name_frame[{len(frames)}][{size}] = {{\n"
     for frame in frames:
         yield "    {\n"
         yield from whole_lines(frame.reshape(-1).tolist())
         yield "    },\n"
     yield "};\n\n/* The bits of the features; class, state and rule. */\n"
-    yield fill("static const struct {\n    uint64_t x[NAME_INPUTS + 1];\n", prefix)
+    yield "static const struct {\n    uint64_t x[NAME_INPUTS + 1];\n"
     yield "    int label;\n    int state;\n    long rule;\n"
-    yield fill(f"}} name_example[{len(frames)}] = {{\n", prefix)
+    yield f"}} name_example[{len(frames)}] = {{\n"
     for frame in frames:
-        yield from _example(made, model, frame, reject)
-    yield "};\n" + fill(_MAIN, prefix)
-
-
-def _example(
-    made: FrameProgram, model: Model, frame: Cells, reject: float
-) -> Iterator[str]:
-    shown = plain_shown(made, model, frame, reject)
-    values = shown.features
-    yield f"    /* {', '.join(map(repr, values)) or 'no features'} */\n"
-    ends = f"{shown.code}, {int(shown.state)}, {shown.rule}"
-    yield f"    {{{bits_of(values)}, {ends}}},\n"
+        shown = plain_shown(made, model, frame, reject)
+        values, ends = shown.features, f"{shown.code}, {shown.state}, {shown.rule}"
+        yield f"    /* {', '.join(map(repr, values)) or 'no features'} */\n"
+        yield f"    {{{bits_of(values)}, {ends}}},\n"
+    yield "};\n" + _MAIN
