@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import click
 
@@ -15,6 +15,7 @@ from fuzzytree.cli import (
     answer_json,
     argument,
     option,
+    option_values,
     say,
     say_rows,
     setting,
@@ -31,9 +32,7 @@ from fuzzytree.tactile.cli.sensors import (
     sensor_of_options,
 )
 
-Form = Literal["onnx", "c"]
-
-_SUFFIXES: dict[str, Form] = {".onnx": "onnx", ".c": "c"}
+_FORMS = ("onnx", "c")
 
 
 class TactileExportOptions(SensorOptions):
@@ -41,8 +40,8 @@ class TactileExportOptions(SensorOptions):
 
     model: str = argument("MODEL")
     output: str = argument("OUT")
-    to: Form | None = option(
-        "--to", "Format; default by the suffix of OUT.", choices=["onnx", "c"]
+    to: str | None = option(
+        "--to", "Format; default by the suffix of OUT.", choices=_FORMS
     )
     data: str | None = data_option
     settings: Sequence[str] = several(
@@ -66,7 +65,10 @@ def command(options: TactileExportOptions) -> int:
     from fuzzytree.tactile.recognition.checking import check_frames
     from fuzzytree.tactile.recognition.recogniser import Recogniser, State, check_inputs
 
-    form = _form(options.output, options.to)
+    form = options.to or Path(options.output).suffix.lower()[1:]
+    if form not in _FORMS:
+        text = "a file from frame to class ends in .onnx or .c"
+        raise click.UsageError(f"{options.output}: {text}")
     write, values = _writer(form, options.settings)
     if form == "onnx":
         require("onnxruntime", "verifying a written onnx file needs")
@@ -114,19 +116,8 @@ def command(options: TactileExportOptions) -> int:
     return 0
 
 
-def _form(output: str, to: Form | None) -> Form:
-    if to is not None:
-        return to
-    suffix = Path(output).suffix.lower()
-    if suffix not in _SUFFIXES:
-        known = " or ".join(_SUFFIXES)
-        raise click.UsageError(f"{output}: a file from frame to class ends in {known}")
-    return _SUFFIXES[suffix]
-
-
-def _writer(form: Form, settings: Sequence[str]) -> tuple[Any, dict[str, Any]]:
+def _writer(form: str, settings: Sequence[str]) -> tuple[Any, dict[str, Any]]:
     """Return the writer of a form, and its options from `--set`."""
-    from fuzzytree.cli import option_values
     from fuzzytree.model import Format
     from fuzzytree.tactile.exporters.c_frames import write_frames_c
     from fuzzytree.tactile.exporters.onnx_frames import write_frames
