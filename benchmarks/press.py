@@ -23,7 +23,7 @@ from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import write_atomically
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link.recording import FrameRecord, Recorder
-from fuzzytree.tactile.presses import Presses, presses_content
+from fuzzytree.tactile.presses import labelled, presses_content
 from fuzzytree.tactile.sensor import FRAMES_A_SECOND, Counters, Frame
 
 _RISE, _STAY, _REST = 8, 64, 22  # frames of a press
@@ -108,7 +108,7 @@ def main(words: Sequence[str] | None = None) -> None:
         found = [press(name, options.count, options.seed, settings) for name in names]
         frames = np.concatenate([one.frames for one in found])
         label = np.repeat(np.arange(len(names)), options.count)
-        presses = Presses(frames, found[0].sensor, label, names)
+        presses = labelled(frames, found[0].sensor, label, names)
         write_atomically(options.output, presses_content(presses))
     except (FuzzyTreeError, ValueError) as error:
         sys.exit(str(error))

@@ -458,6 +458,3 @@ def _fits(text: str, most: int, *, is_whole: bool) -> bool:
         return False
     is_plain = text.isascii() and "_" not in text
     return is_plain and 0.0 <= value <= most and not (is_whole and value % 1)
-
-
-Presses, read_presses = labelled, read_frames  # `tactile press` calls them so

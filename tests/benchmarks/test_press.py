@@ -16,7 +16,7 @@ from press_physics import PAPER, PhysicsSettings, press
 from press_shapes import OBJECTS
 
 from fuzzytree.tactile.link.recording import read_recording
-from fuzzytree.tactile.presses import read_presses
+from fuzzytree.tactile.presses import read_frames
 
 PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "simulator.md"
 
@@ -29,7 +29,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_presses_of_all_objects_are_written_with_their_labels() -> None:
     for name in ("a.npz", "b.npz"):
         main(["all", "--count", "3", "--seed", "9", "-o", name])
-    found = read_presses("a.npz")
+    found = read_frames("a.npz")
     assert found.label_names == tuple(OBJECTS)
     assert found.label.tolist() == np.repeat(range(7), 3).tolist()
     assert (found.sensor.full, found.sensor.threshold) == (255, PAPER.threshold)
@@ -54,7 +54,7 @@ def test_a_setting_is_changed_by_name() -> None:
     main(["circle", "--count", "2", "-o", "a.npz", *changes])
     settings = PhysicsSettings(tilt=0.0, bend_n=float("inf"), wiring="diodes")
     wanted = press("circle", 2, settings=settings).frames
-    assert np.array_equal(read_presses("a.npz").frames, wanted)
+    assert np.array_equal(read_frames("a.npz").frames, wanted)
 
 
 @pytest.mark.parametrize(
