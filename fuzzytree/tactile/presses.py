@@ -12,9 +12,7 @@ A table (`.csv`) has a line for each frame, with the columns `time`, `number`, `
 
 from __future__ import annotations
 
-import codecs
 import io
-import itertools
 import lzma
 import math
 import os
@@ -31,9 +29,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from msgspec import structs
 
-from fuzzytree.csv_rows import BLOCK, CsvRows, blocks
 from fuzzytree.errors import InvalidModelError, ReadError, TableError
 from fuzzytree.files import PathLike, check_stream, read_bounded, reason
+from fuzzytree.tables import batches, pieces
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link.recording import FrameFile, Recording, RecordingFile
 from fuzzytree.tactile.sensor import (
@@ -47,6 +45,8 @@ from fuzzytree.tactile.sensor import (
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+
+    from fuzzytree.model import FloatArray
 
     Numbers = Sequence[int] | npt.NDArray[np.int64 | np.float64]
 
@@ -355,29 +355,35 @@ def read_frames(path: PathLike, *, label: str = "label") -> Recording:
 def _read_table(path: PathLike, most: int) -> Recording:
     """Return the frames of a table, whose cells are at most so much."""
     name = os.fspath(path)
-    titles: list[str] = []
-    places: list[int] = []
-    sides = (0, 0)
     cells: list[npt.NDArray[np.uint16]] = []
-    others: dict[str, list[npt.NDArray[np.float64]]] = {title: [] for title in _MOST}
+    others: list[FloatArray] = []
     try:
         check_stream(path)
         if Path(path).stat().st_size > LIMIT:
             raise ReadError(f"{name}: is larger than {LIMIT} bytes, too large to read")
-        with Path(path).open("rb") as file:
-            head = file.read(BLOCK).removeprefix(codecs.BOM_UTF8)
-            for rows in blocks(head, file.read, b",", name):
-                skipped = 0 if titles else 1
-                if skipped:
-                    titles = [title.strip() for title in rows.header()]
-                    places, sides = _cell_places(titles, f"{name}:{rows.line}")
-                values = _values(rows, titles, most, skipped)
-                cells.append(values[places].T.astype(np.uint16).reshape(-1, *sides))
-                for title in others:
-                    if title in titles:
-                        others[title].append(values[titles.index(title)])
-    except UnicodeDecodeError as error:
-        raise ReadError(f"{name}: is no UTF-8 text; save it as UTF-8") from error
+        first = next(pieces(path), None)
+        if first is None:
+            raise ReadError(f"{name}: holds no frame")
+        titles, sides = _cell_titles(first.columns, name)
+        titles += [title for title in _MOST if title in first.columns]
+        limits = np.array([[_MOST.get(title, most)] for title in titles])
+        is_time = np.array([[title == "time"] for title in titles])
+        count = math.prod(sides)
+        for batch in batches(path, titles):
+            values = batch.values
+            is_fit = (values >= 0.0) & (values <= limits)
+            is_fit &= (values == np.floor(values)) | is_time
+            if not is_fit.all():
+                row, column = np.argwhere(~is_fit.T)[0].tolist()
+                value = float(values[column, row])
+                text = "a missing cell" if math.isnan(value) else f"{value:.16g}"
+                kind = "number" if is_time[column] else "whole number"
+                raise ReadError(
+                    f"{batch.piece.where(row)}: {titles[column]}: {text} is no {kind} "
+                    f"from 0 to {limits[column, 0]}"
+                )
+            cells.append(values[:count].T.astype(np.uint16).reshape(-1, *sides))
+            others.append(values[count:])
     except TableError as error:
         raise ReadError(str(error)) from error
     except OSError as error:
@@ -387,19 +393,14 @@ def _read_table(path: PathLike, most: int) -> Recording:
     frames: Cells = np.concatenate(cells)
     if frames.max() <= 255:
         frames = frames.astype(np.uint8)
-    times, numbers = (np.concatenate(part) if part else () for part in others.values())
+    known = dict(zip(titles[count:], np.concatenate(others, axis=1), strict=True))
+    times, numbers = (known.get(title, ()) for title in _MOST)
     sensor = Sensor(*sides, _usual_full(frames))
     return labelled(frames, sensor, times=times, numbers=numbers, is_stream=True)
 
 
-def _cell_places(
-    titles: Sequence[str], where: str
-) -> tuple[list[int], tuple[int, int]]:
-    """Return which columns hold the cells, row by row, and the sides of a frame."""
-    found = {title: place for place, title in enumerate(titles)}
-    if len(found) < len(titles):
-        twice = next(one for place, one in enumerate(titles) if found[one] != place)
-        raise ReadError(f"{where}: names the column {twice[:40]!r} twice")
+def _cell_titles(titles: Sequence[str], name: str) -> tuple[list[str], tuple[int, int]]:
+    """Return the columns that hold the cells, row by row, and the sides of a frame."""
     rows = columns = 0
     for title in titles:
         cell = _CELL.fullmatch(title)
@@ -407,54 +408,17 @@ def _cell_places(
             rows, columns = max(rows, int(cell[1]) + 1), max(columns, int(cell[2]) + 1)
         elif title not in _MOST:
             raise ReadError(
-                f"{where}: the column {title[:40]!r} is neither time, number nor a "
+                f"{name}: the column {title[:40]!r} is neither time, number nor a "
                 f"cell such as r0c0"
             )
     if not rows:
-        raise ReadError(f"{where}: has no column of a cell such as r0c0")
-    _check_sides((rows, columns), where)
+        raise ReadError(f"{name}: has no column of a cell such as r0c0")
+    _check_sides((rows, columns), name)
     cells = [f"r{row}c{column}" for row in range(rows) for column in range(columns)]
     for title in cells:
-        if title not in found:
+        if title not in titles:
             raise ReadError(
-                f"{where}: has no column {title!r}, and frames of {rows} x {columns} "
+                f"{name}: has no column {title!r}, and frames of {rows} x {columns} "
                 f"cells"
             )
-    return [found[title] for title in cells], (rows, columns)
-
-
-def _values(
-    rows: CsvRows, titles: Sequence[str], most: int, skipped: int
-) -> npt.NDArray[np.float64]:
-    """Return the numbers of some rows, column by column."""
-    found = rows.numbers(len(titles), range(len(titles)), skipped, ())
-    if found is not None:
-        values = np.array(found, np.float64)
-        limits = np.array([[_MOST.get(title, most)] for title in titles])
-        is_time = np.array([[title == "time"] for title in titles])
-        is_fit = (values == np.floor(values)) | is_time
-        if (is_fit & (values >= 0.0) & (values <= limits)).all():
-            return values
-    table = rows.table(len(titles), range(len(titles)))
-    if table.num_rows <= skipped:
-        return np.empty((len(titles), 0))
-    lines = zip(*(column.to_pylist() for column in table.columns), strict=True)
-    for row, texts in itertools.islice(enumerate(lines), skipped, None):
-        for title, text in zip(titles, texts, strict=True):
-            limit, is_whole = _MOST.get(title, most), title != "time"
-            if not _fits(text, limit, is_whole=is_whole):
-                kind = "whole number" if is_whole else "number"
-                raise ReadError(
-                    f"{rows.name}:{rows.line_of(row)}: {title}: {text[:40]!r} is no "
-                    f"{kind} from 0 to {limit}"
-                )
-    raise ReadError(f"{rows.name}:{rows.line}: a cell from here on is no number")
-
-
-def _fits(text: str, most: int, *, is_whole: bool) -> bool:
-    try:
-        value = float(text)
-    except ValueError:
-        return False
-    is_plain = text.isascii() and "_" not in text
-    return is_plain and 0.0 <= value <= most and not (is_whole and value % 1)
+    return cells, (rows, columns)

@@ -203,6 +203,9 @@ def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
         assert str(caught.value) == f"{path}: 'label_names' holds signs that are none"
 
 
+TEXT = ":3: column 'r0c0' holds text where a number is needed: "
+
+
 def table(path: Path, text: str) -> Path:
     path.write_text(text, "utf-8")
     return path
@@ -238,41 +241,49 @@ def test_a_table_is_read_in_blocks(tmp_path: Path) -> None:
     wrong = table(tmp_path / "b.csv", text + "1,\n")
     with pytest.raises(ReadError) as caught:
         read_frames(wrong)
-    whole = "r0c1: '' is no whole number from 0 to 65535"
+    whole = "r0c1: a missing cell is no whole number from 0 to 65535"
     assert str(caught.value) == f"{wrong}:400002: {whole}"
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", ": holds no frame"),
+        ("", " is empty: it needs a line with column names"),
         ("r0c0", ": holds no frame"),
         ("time,number,r0c0\n", ": holds no frame"),
-        ("r0c0\n1\ncup\n", ":3: r0c0: 'cup' is no whole number from 0 to 65535"),
-        ("r0c0\n1\n1_0\n", ":3: r0c0: '1_0' is no whole number from 0 to 65535"),
-        ("r0c0,r0c1\n1,2.5\n", ":2: r0c1: '2.5' is no whole number from 0 to 65535"),
-        ("r0c0\n-1\n", ":2: r0c0: '-1' is no whole number from 0 to 65535"),
-        ("r0c0\n\n65536\n", ":3: r0c0: '65536' is no whole number from 0 to 65535"),
-        ("time,r0c0\nnan,1\n", ":2: time: 'nan' is no number from 0 to 8589934592"),
+        (
+            "r0c0\n1\ncup\n",
+            ":3: column 'r0c0' holds text where a number is needed: 'cup'",
+        ),
+        (
+            "r0c0\n1\n1_0\n",
+            ":3: column 'r0c0' holds text where a number is needed: '1_0'",
+        ),
+        ("r0c0,r0c1\n1,2.5\n", ":2: r0c1: 2.5 is no whole number from 0 to 65535"),
+        ("r0c0\n-1\n", ":2: r0c0: -1 is no whole number from 0 to 65535"),
+        ("r0c0\n\n65536\n", ":3: r0c0: 65536 is no whole number from 0 to 65535"),
+        (
+            "time,r0c0\nnan,1\n",
+            ":2: time: a missing cell is no number from 0 to 8589934592",
+        ),
         (
             "number,r0c0\n9007199254740993,1\n",
-            ":2: number: '9007199254740993' is no whole number from 0 to "
+            ":2: number: 9007199254740992 is no whole number from 0 to "
             "9007199254740991",
         ),
         ("r0c0,r0c1\n1,2\n3\n", ":3: 1 cell, and line 1 names 2 columns"),
         ('r0c0\n"1\n', ":2: broken CSV: a quote is not closed"),
-        ("time,number\n0,0\n", ":1: has no column of a cell such as r0c0"),
+        ("time,number\n0,0\n", ": has no column of a cell such as r0c0"),
         (
             "r0c0,r0c1,r1c0\n1,2,3\n",
-            ":1: has no column 'r1c1', and frames of 2 x 2 cells",
+            ": has no column 'r1c1', and frames of 2 x 2 cells",
         ),
-        ("r0c0,time,r0c0\n1,2,3\n", ":1: names the column 'r0c0' twice"),
+        ("r0c0,time,r0c0\n1,2,3\n", ": column 'r0c0' stands there more than once"),
         (
-            "r0c0;r0c1\n1;2\n",
-            ":1: the column 'r0c0;r0c1' is neither time, number nor a cell such as "
-            "r0c0",
+            "r0c0,cup\n1,2\n",
+            ": the column 'cup' is neither time, number nor a cell such as r0c0",
         ),
-        ("r256c0\n1\n", ":1: a frame has 1 to 256 rows and columns, not 257 x 1"),
+        ("r256c0\n1\n", ": a frame has 1 to 256 rows and columns, not 257 x 1"),
     ],
     ids=lambda value: value[:32],
 )
@@ -321,5 +332,5 @@ def test_frames_that_do_not_fit_the_board_are_refused(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", "time,r0c0\n0,255\n0,256\n")
     with pytest.raises(ReadError) as caught:
         open_frames(path, Board("mat", Sensor(1, 1, 200), Marker("AA 55")))
-    wrong = "r0c0: '256' is no whole number from 0 to 255"
+    wrong = "r0c0: 256 is no whole number from 0 to 255"
     assert str(caught.value) == f"{path}:3: {wrong}"
