@@ -279,7 +279,7 @@ def _floor_row(tested: Accuracy) -> tuple[str, str, str]:
     """Return a line about the floor of strengths, and why it is that one."""
     weak = 100 * (tested.weak or 0.0)
     text = f"0.001 rejects {weak:.1f} % of the rows left out"
-    return "floor", f"{tested.floor:g}", f"{text}; `tactile live` rejects what is below"
+    return "floor", f"{tested.floor:g}", f"{text}; below it a row is unknown"
 
 
 def _few_groups(table: Table, groups: IntArray) -> Lines:

@@ -105,8 +105,8 @@ class Semantics(Value, frozen=True):
         sharpness: The power of the strengths that weigh the rules' probabilities, one
             of 1, 2, 4, ..., 1024; unset in a model without probabilities.
         floor: The strength of a raw rule below which a row is like none that was
-            learnt from, in [0, 1]; `fuzzytree tactile` uses it, and no answer here
-            depends on it. Unset where it was not measured.
+            learnt from, in [0, 1]; no answer depends on it. Unset where it was not
+            measured.
     """
 
     conjunction: Conjunction = "minimum"

@@ -338,7 +338,7 @@ def test_groups_that_are_left_out_choose_the_floor_of_strengths(call: Call) -> N
     code, _, err = call(*words)
     assert code == 0
     assert "few      2 classes firm, soft: below 10 groups" in err
-    said = r"floor    0 +0\.001 rejects [0-9.]+ % of the rows left out; `tactile live`"
+    said = r"floor    0 +0\.001 rejects [0-9.]+ % of the rows left out; below it a row"
     assert re.search(said, err)
     tree = ft.load("t.yaml")
     assert isinstance(tree, FuzzyTree)

@@ -342,7 +342,7 @@ def test_what_is_no_table_or_archive_leaves_no_recording(
 ) -> None:
     Path("b.csv").write_text("time,number,r0c0\n0.0,0,1\n0.5,1,one\n")
     code, out, err = call("tactile", "replay", "b.csv", "-o", "b.ftr")
-    text = "b.csv:3: r0c0: 'one' is no whole number from 0 to 65535"
+    text = "b.csv:3: column 'r0c0' holds text where a number is needed: 'one'"
     assert (code, out, err) == (2, "", f"{text}\n")
     assert call("tactile", "replay", "a.ftr", "-o", "a.npz")[0] == 0
     Path("b.npz").write_bytes(Path("a.npz").read_bytes()[:-30])
