@@ -198,3 +198,23 @@ def test_calibrate_writes_a_board_that_live_features_and_learn_understand(
         assert main(["tactile", "calibrate", "mat.yaml", text, "-o", "no.yaml"]) == 2
         assert capsys.readouterr().err.splitlines()[0] == sentence
         assert not Path("no.yaml").exists()
+
+
+def test_features_of_archives_and_tables_are_in_the_unit_of_their_board(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    board = Board("mat", Sensor(2, 2), Marker("AA 55"), calibration=LAW)
+    Path("kpa.yaml").write_text(board_text(board), "utf-8")
+    np.savez("a.npz", frames=np.array([[[100, 0], [200, 0]]], np.uint8))
+    Path("a.csv").write_text("r0c0,r0c1,r1c0,r1c1\n100,0,200,0\n", "utf-8")
+    for name in ("a.npz", "a.csv"):
+        words = ["tactile", "features", name, "--board", "kpa.yaml", "-o", "-"]
+        assert main([*words, "--features", "force"]) == 0
+        force = float(capsys.readouterr().out.splitlines()[1].split(",")[0])
+        assert force == pytest.approx(50.0, abs=0.01)
+    Path("m.yaml").write_text("", "utf-8")
+    assert main(["tactile", "export", "m.yaml", "m.onnx", "--board", "kpa.yaml"]) == 2
+    said = capsys.readouterr().err.splitlines()[0]
+    text = "a file from frame to class takes readings; name a board without one"
+    assert said == f"kpa.yaml is calibrated, and {text}"

@@ -102,9 +102,12 @@ def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_P
 
     Count frames with saturated cells, with several objects, and placements.
     """
+    import numpy as np
+
     from fuzzytree.tactile.link.recording import Recording
     from fuzzytree.tactile.presses import open_frames
     from fuzzytree.tactile.recognition.objects import followed
+    from fuzzytree.tactile.rest import Rest
     from fuzzytree.tactile.sensor import saturated
 
     placed, board = 0, None
@@ -130,6 +133,10 @@ def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_P
             if isinstance(file, Recording) and not file.is_stream:
                 frames, sensor = file.frames, file.sensor
                 counts["saturated"] += int((saturated(sensor, frames) > 0).sum())
+                if file.board.calibration is not None:
+                    rest = Rest(sensor, 0.0, file.board.calibration)
+                    frames = np.array([rest(frame, 0.0) for frame in frames])
+                    sensor = rest.bare
             else:
                 seen = followed(file)
                 frames, sensor = seen.frames, seen.sensor
@@ -153,7 +160,7 @@ def _check_alike(frames: Sequence[str], parts: Sequence[_Part]) -> None:
     def kind(part: _Part) -> str:
         found = part.sensor
         size = f"{found.rows} x {found.columns} cells"
-        return f"{size}, full {found.full}, threshold {found.threshold}"
+        return f"{size}, full {found.range_text}, threshold {found.threshold}"
 
     for name, part in zip(frames, parts, strict=True):
         if kind(part) != kind(parts[0]):

@@ -56,7 +56,11 @@ def sensor_of_options(options: SensorOptions) -> Sensor:
 
     if options.board is not None:
         others = (options.size, options.full, options.threshold)
-        return board_of_option(options.board, "--sensor, --full and", others).sensor
+        known = board_of_option(options.board, "--sensor, --full and", others)
+        if known.calibration is not None:
+            text = "a file from frame to class takes readings; name a board without one"
+            raise click.UsageError(f"{options.board} is calibrated, and {text}")
+        return known.sensor
     if options.size is None:
         raise click.UsageError(
             "name the board with --board, or its size: --sensor 16x16"
@@ -77,11 +81,7 @@ def board_of_option(name: str, names: str, others: Sequence[object]) -> Board:
 
     if any(one is not None for one in others):
         raise click.UsageError(f"--board sets {names} --threshold; choose one of them")
-    known = load_board(name)
-    if known.calibration is not None:
-        text = "frames are read without a calibration here; name a board without one"
-        raise click.UsageError(f"{name} is calibrated, and {text}")
-    return known
+    return load_board(name)
 
 
 def frames_of_file(
