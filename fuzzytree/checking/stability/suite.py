@@ -36,7 +36,7 @@ _PROBES = 2_000  # for the comparison with the exact answers
 _SOME = 250  # probes for criteria that load a model anew many times
 _SOME_DATA = 100  # rows of data beside them
 _NOT_MEASURED = "measured by `fuzzytree bench`, for it takes time on a quiet machine"
-_DATA = 20_000  # rows of data for the comparison with the exact answers
+_DATA = 1_000  # rows of data for the comparison with the exact answers
 
 
 def examine(
@@ -54,7 +54,7 @@ def examine(
         model: A tree or a rule base.
         runtimes: What to run; those that are not installed are named and left out.
         formats: What to write and take back.
-        data: Rows of one's own, shape (inputs, rows); at most 20,000, evenly drawn.
+        data: Rows of one's own, shape (inputs, rows); at most 1,000, evenly drawn.
         only: The codes of criteria to apply; all if empty. `N2` includes `N2b`.
         progress: Called with the current check and the share that is done, in [0, 1].
 
