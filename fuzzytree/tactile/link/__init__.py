@@ -27,7 +27,7 @@ from fuzzytree.tactile.link.markers import MarkerDecoder
 from fuzzytree.tactile.link.sentinels import SentinelDecoder
 from fuzzytree.tactile.link.starting import measured, remarks
 from fuzzytree.tactile.link.texts import TextDecoder
-from fuzzytree.tactile.link.watching import PATIENCE_S, RequestTimer, Watch
+from fuzzytree.tactile.link.watching import PATIENCE_S, Watch
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
 if TYPE_CHECKING:
@@ -295,22 +295,20 @@ class Connection(contextlib.AbstractContextManager["Connection"]):
 
     def _listen(self) -> None:
         """Read and send requests until `close`, or until the port fails."""
-        port, questions = self._serial, RequestTimer(self.board)
+        port, watch = self._serial, self._watch
         while not self._stop.is_set():
             now = time.monotonic()
-            if questions.is_overdue(now):
+            if watch.is_overdue(now):
                 self._decoder.timed_out()
-            if questions.is_due(now):
+            if watch.is_due(now):
                 port.write(self._decoder.ask)
                 self._decoder.requested()
-                self._watch.requested()
-                questions.sent(time.monotonic())
+                watch.sent(time.monotonic())
             data = self._read()
             now = time.monotonic()
             if data:
                 found = self._decoder.feed(data)
-                questions.came(len(found), now)
-                self._watch.came(data, len(found), now)
+                watch.came(data, len(found), now)
                 self._pass_on(found, now)
             self._look(now)
 
