@@ -14,10 +14,11 @@ import stat
 import threading
 import time
 import zlib
+from array import array
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import astuple, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -127,28 +128,26 @@ def layout_of(board: Board) -> np.dtype[np.void]:
     )
 
 
-def _packed(frame: Frame, counters: Counters, board: Board) -> bytes:
+def _packed(
+    board: Board, frame: Frame, counters: Counters, mark: bytes = MARK
+) -> bytes:
     """Return a record as bytes."""
-    cells = check_frames(board.sensor, frame.cells)[0]
-    largest = board.sensor.largest
+    cells, largest = check_frames(board.sensor, frame.cells)[0], board.sensor.largest
     if cells.min() < 0 or cells.max() > largest:
         wrong = cells.min() if cells.min() < 0 else cells.max()
         raise TableError(f"a cell lies in 0 to {largest}, not {wrong}")
-    return _record(MARK, frame, counters, cells, board)
-
-
-def _record(
-    mark: bytes, frame: Frame, counters: Counters, cells: Cells, board: Board
-) -> bytes:
     time_ns = round(frame.time * _NS)
     values = (mark, frame.number, time_ns, astuple(counters), cells, 0)
     content = np.array(values, layout_of(board)).tobytes()[:-4]
     return content + crc(content)
 
 
-def _rest_cells(sensor: Sensor) -> Cells:
-    """Return what cells read at rest as a frame; masked cells read the largest."""
-    return np.where(is_masked(sensor), sensor.largest, baseline_of(sensor))
+def _packed_rest(
+    board: Board, sensor: Sensor, frame: Frame, counters: Counters
+) -> bytes:
+    """Return a record of what cells read at rest; masked cells read the largest."""
+    cells = np.where(is_masked(sensor), sensor.largest, baseline_of(sensor))
+    return _packed(board, replace(frame, cells=cells), counters, REST)
 
 
 def _rest_sensor(sensor: Sensor, cells: Cells) -> Sensor:
@@ -181,8 +180,23 @@ def _unknown() -> npt.NDArray[np.int64]:
     return np.zeros(0, np.int64)
 
 
+class _Closing:
+    """What `with` closes at its end."""
+
+    def close(self) -> None:
+        """Do nothing: all is in memory."""
+
+    def __enter__(self) -> Self:
+        """Give itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+
 @dataclass(frozen=True, slots=True)
-class Recording(contextlib.AbstractContextManager["Recording"]):
+class Recording(_Closing):
     """All frames of a file that are whole; they are read as a `RecordingFile`.
 
     Attributes:
@@ -232,14 +246,8 @@ class Recording(contextlib.AbstractContextManager["Recording"]):
         """Return itself."""
         return self
 
-    def close(self) -> None:
-        """Do nothing: all is in memory."""
 
-    def __exit__(self, *_: object) -> None:
-        """Do nothing, either."""
-
-
-class Recorder(contextlib.AbstractContextManager["Recorder"]):
+class Recorder(_Closing):
     """Write frames to a file, so that at most the last one can be lost.
 
     Each frame goes to the system in one piece: whatever ends this program, it is in
@@ -301,7 +309,15 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
             TableError: If the frame is of another size, or a cell has no place.
             WriteError: If it cannot be written; all frames before it are kept.
         """
-        self._append(_packed(frame, counters, self._board))
+        self._append(_packed(self._board, frame, counters))
+
+    def write_rest(self, sensor: Sensor, frame: Frame, counters: Counters) -> None:
+        """Append what the cells read at rest, from the frame after this one on.
+
+        Raises:
+            WriteError: If it cannot be written; all frames before it are kept.
+        """
+        self._append(_packed_rest(self._board, sensor, frame, counters))
 
     def _append(self, content: bytes) -> None:
         self._raise_failure()
@@ -315,15 +331,6 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
             self._written += 1
             self.most_at_risk = max(self.most_at_risk, self._written - self._kept)
             self._wake.notify()
-
-    def write_rest(self, sensor: Sensor, frame: Frame, counters: Counters) -> None:
-        """Append what the cells read at rest, from the frame after this one on.
-
-        Raises:
-            WriteError: If it cannot be written; all frames before it are kept.
-        """
-        cells = _rest_cells(sensor)
-        self._append(_record(REST, frame, counters, cells, self._board))
 
     def close(self) -> None:
         """Wait until the disk has all of it, and close the file.
@@ -339,10 +346,6 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._syncing.join()
         os.close(self._file)
         self._raise_failure()
-
-    def __exit__(self, *_: object) -> None:
-        """Close the file."""
-        self.close()
 
     def _sync(self) -> None:
         """Ask the disk to keep the file whenever there are new frames."""
@@ -369,7 +372,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         return WriteError(f"{self._name}: cannot be written: {reason(error)}")
 
 
-class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
+class RecordingFile(_Closing):
     """Read a recording frame by frame, however long it is.
 
     Iterating begins at the first record. What is damaged is left out and counted.
@@ -379,7 +382,6 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
         sensor: That of the board; while frames are given, with what the cells read at
             rest since the last tare, hot or dead cell.
         started_ns: When the recording began, in nanoseconds since 1970 (UTC).
-        most_frames: How many records the file has room for.
         damaged: Records that were damaged, of those that were passed.
         cut_bytes: Bytes at the end that are less than a record, once it was reached.
 
@@ -397,7 +399,6 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
         except BaseException:
             self._file.close()
             raise
-        self.most_frames = (self._end - self._begin) // self._layout.itemsize
 
     def __iter__(self) -> Iterator[FrameRecord]:
         """Give the records that are whole, from the first on.
@@ -444,27 +445,25 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
         Raises:
             ReadError: As iterating, or if they are too many for memory.
         """
-        sensor, most = self.board.sensor, self.most_frames
-        shape = (most, sensor.rows, sensor.columns)
-        kind = sensor.dtype
+        most = (self._end - self._begin) // self._layout.itemsize
+        sensor, last, count = self.board.sensor, Counters(), 0
+        shape, kind = (most, sensor.rows, sensor.columns), sensor.dtype
         if math.prod(shape) * kind.itemsize > LARGEST_ARRAY:
             raise ReadError(
                 f"{self._name}: its {most} frames are more than "
                 f"{LARGEST_ARRAY} bytes, too many for memory"
             )
-        frames, count = np.empty(shape, kind), 0
+        frames = np.empty(shape, kind)
         times, numbers = np.empty(most, np.float64), np.empty(most, np.int64)
-        record = None
-        for record in self:
-            frames[count], times[count] = record.frame.cells, record.frame.time
-            numbers[count] = record.frame.number
-            count += 1
+        for count, (frame, last) in enumerate(self, 1):  # noqa: B007  # both are kept
+            frames[count - 1], times[count - 1] = frame.cells, frame.time
+            numbers[count - 1] = frame.number
         return Recording(
             self.board,
             frames[:count],
             times[:count],
             numbers[:count],
-            record.counters if record else Counters(),
+            last,
             self.damaged,
             self.cut_bytes,
             self.started_ns,
@@ -473,10 +472,6 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    def __exit__(self, *_: object) -> None:
-        """Close the file."""
-        self.close()
 
     def _read(self, place: int, size: int) -> bytes:
         try:
@@ -543,9 +538,8 @@ def write_recording(path: PathLike, file: FrameFile) -> None:
         for record in file:
             if file.sensor is not stated and before is not None:
                 stated = file.sensor
-                cells = _rest_cells(stated)
-                output.write(_record(REST, *before, cells, file.board))
-            output.write(_packed(*record, file.board))
+                output.write(_packed_rest(file.board, stated, *before))
+            output.write(_packed(file.board, *record))
             before = record
 
 
@@ -570,8 +564,7 @@ def _open(path: PathLike) -> io.FileIO:
     """Open a file; a pipe or a device is none, and would keep us waiting."""
     name = os.fspath(path)
     try:
-        is_file = stat.S_ISREG(Path(path).stat().st_mode)
-        if is_file:
+        if stat.S_ISREG(Path(path).stat().st_mode):
             return io.FileIO(path)
     except (OSError, ValueError) as error:
         raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
@@ -611,31 +604,24 @@ def review(file: FrameFile) -> Review:
     Raises:
         ReadError: If it cannot be read.
     """
-    frames = gaps = missing = 0
-    longest_s = 0.0
-    first = last = None
+    times, numbers, counters = array("d"), array("q"), Counters()
     extremes = np.zeros((2, 0, 0), np.int64)  # the least and the most of each cell
-    for record in file:
-        frame = record.frame
-        if last is None:
-            first, extremes = record, np.array([frame.cells, frame.cells])
-        else:
-            np.minimum(extremes[0], frame.cells, out=extremes[0])
-            np.maximum(extremes[1], frame.cells, out=extremes[1])
-            longest_s = max(longest_s, frame.time - last.frame.time)
-            left_out = max(frame.number - last.frame.number - 1, 0)
-            gaps, missing = gaps + (left_out > 0), missing + left_out
-        last = record
-        frames += 1
-    is_still = still(file.board, extremes) if frames > 1 else np.zeros((0, 0), bool)
+    for frame, counters in file:  # noqa: B007  # the last ones are kept
+        if not times:
+            extremes = np.array([frame.cells, frame.cells])
+        np.minimum(extremes[0], frame.cells, out=extremes[0])
+        np.maximum(extremes[1], frame.cells, out=extremes[1])
+        times.append(frame.time)
+        numbers.append(frame.number)
+    left_out = [count - 1 for count in np.diff(numbers).tolist() if count > 1]
     return Review(
-        frames,
-        last.frame.time - first.frame.time if first and last else 0.0,
-        longest_s,
-        gaps,
-        missing,
+        len(times),
+        times[-1] - times[0] if times else 0.0,
+        float(np.diff(times).max(initial=0.0)),
+        len(left_out),
+        sum(left_out),
         file.damaged,
         file.cut_bytes,
-        places(is_still),
-        last.counters if last else Counters(),
+        places(still(file.board, extremes)) if len(times) > 1 else (),
+        counters,
     )
