@@ -24,13 +24,10 @@ from fuzzytree.model import Mistake, Value
 from fuzzytree.tactile.boards import (
     Board,
     Byte,
-    Lines,
     Marker,
-    Order,
-    Port,
-    Pressure,
     Request,
     Sentinel,
+    Settings,
     Start,
     Text,
 )
@@ -62,35 +59,6 @@ class SensorOfBoard(FileRecord, frozen=True, kw_only=True):
     ] = ()
 
 
-class BoardFile(FileRecord, frozen=True, kw_only=True):
-    """A board with a tactile sensor: what it sends, and how it is connected.
-
-    One of `marker`, `sentinel`, `request` and `text` says how a frame lies in the
-    bytes.
-    """
-
-    noun: ClassVar[str] = "a board"
-    forms: ClassVar[tuple[KeyForm, ...]] = tuple(
-        KeyForm((key,)) for key in ("marker", "sentinel", "request", "text")
-    )
-    format: Literal["fuzzytree-board/1"]
-    name: Name
-    sensor: SensorOfBoard
-    marker: Marker | None = None
-    sentinel: Sentinel | None = None
-    request: Request | None = None
-    text: Text | None = None
-    order: Order = "rows"
-    pressure: Pressure = "rises"
-    port: Port = Port()
-    start: Start = Start()
-    banner: Lines = 0
-    calibration: Calibration | None = None
-
-
-MOST_BYTES: Final = 4 * 2**20
-"""The largest file of a board; one of 65536 cells with a baseline is a tenth of it."""
-
 _FAMILIES: Final = {
     "marker": "marker",
     "sentinel": "end zero",
@@ -98,6 +66,28 @@ _FAMILIES: Final = {
     "text": "frame",
 }
 """Of each family: the fields that are always written."""
+
+
+class BoardFile(FileRecord, Settings, frozen=True):
+    """A board with a tactile sensor: what it sends, and how it is connected.
+
+    One of `marker`, `sentinel`, `request` and `text` says how a frame lies in the
+    bytes.
+    """
+
+    noun: ClassVar[str] = "a board"
+    forms: ClassVar[tuple[KeyForm, ...]] = tuple(KeyForm((key,)) for key in _FAMILIES)
+    format: Literal["fuzzytree-board/1"]
+    name: Name
+    sensor: SensorOfBoard
+    marker: Marker | None = None
+    sentinel: Sentinel | None = None
+    request: Request | None = None
+    text: Text | None = None
+
+
+MOST_BYTES: Final = 4 * 2**20
+"""The largest file of a board; one of 65536 cells with a baseline is a tenth of it."""
 
 
 def load_board(path: PathLike) -> Board:
@@ -143,17 +133,8 @@ checksum='none', tail='')
         mistakes += ((("sensor", *path), text) for path, text in error.mistakes)
         sensor = Sensor(file.sensor.rows, file.sensor.columns, file.sensor.full)
     try:
-        board = Board(
-            name=file.name,
-            sensor=sensor,
-            protocol=getattr(file, family),
-            order=file.order,
-            pressure=file.pressure,
-            port=file.port,
-            start=file.start,
-            banner=file.banner,
-            calibration=file.calibration,
-        )
+        settings = {key: getattr(file, key) for key in Settings.__struct_fields__}
+        board = Board(file.name, sensor, getattr(file, family), **settings)
     except InvalidModelError as error:
         mistakes += error.mistakes
     else:

@@ -14,12 +14,10 @@ from fuzzytree.tactile.calibration import Calibration
 from fuzzytree.tactile.rest import FOLLOW_S
 from fuzzytree.tactile.sensor import Sensor, limit_mistakes
 
-HEXADECIMAL: Final = "[0-9A-Fa-f]{2}( ?[0-9A-Fa-f]{2}){0,63}"
-"""The pattern of a marker, tail or question: two digits a byte, blanks allowed."""
-PREFIX: Final = r"[!-*/:<-~][!-+\--:<-~]{0,31}"
-"""The pattern of a prefix: a word of ASCII that no number begins like."""
-ABOUT_HEXADECIMAL: Final = "1 to 64 bytes in hexadecimal, such as 'AA 55'"
-ABOUT_PREFIX: Final = (
+_HEXADECIMAL: Final = "[0-9A-Fa-f]{2}( ?[0-9A-Fa-f]{2}){0,63}"
+_ABOUT_HEXADECIMAL: Final = "1 to 64 bytes in hexadecimal, such as 'AA 55'"
+_PREFIX: Final = r"[!-*/:<-~][!-+\--:<-~]{0,31}"  # no number begins like it
+_ABOUT_PREFIX: Final = (
     "a word of 1 to 32 signs of ASCII, without , and ;, that begins with no digit, "
     "sign or point"
 )
@@ -29,15 +27,17 @@ Skip = Annotated[int, Meta(ge=0, le=1024)]
 Hexadecimal = Annotated[
     str,
     Meta(
-        pattern=rf"^{HEXADECIMAL}$(?!\n)",
-        description=ABOUT_HEXADECIMAL,
+        pattern=rf"^{_HEXADECIMAL}$(?!\n)",
+        description=_ABOUT_HEXADECIMAL,
         examples=["AA 55", "0D 0A"],
     ),
 ]
 Tail = Annotated[
-    str, Meta(pattern=rf"^({HEXADECIMAL})?$(?!\n)", description=ABOUT_HEXADECIMAL)
+    str, Meta(pattern=rf"^({_HEXADECIMAL})?$(?!\n)", description=_ABOUT_HEXADECIMAL)
 ]
-Prefix = Annotated[str, Meta(pattern=rf"^({PREFIX})?$(?!\n)", description=ABOUT_PREFIX)]
+Prefix = Annotated[
+    str, Meta(pattern=rf"^({_PREFIX})?$(?!\n)", description=_ABOUT_PREFIX)
+]
 Seconds = Annotated[float, Meta(ge=0.001, le=3600.0)]
 Baud = Annotated[int, Meta(ge=1, le=100_000_000)]
 StartFrames = Annotated[int, Meta(ge=0, le=10_000)]
@@ -183,13 +183,10 @@ class Start(Value, FileRecord, frozen=True):
     )
 
 
-class Board(Value, frozen=True):
-    """A board: its sensor, its protocol and its port.
+class Settings(Value, frozen=True, kw_only=True):
+    """What a board and its file say alike.
 
     Attributes:
-        name: For people.
-        sensor: The matrix.
-        protocol: How a frame lies in the bytes.
         order: Whether cells come row by row, or column by column.
         pressure: Whether a cell reads more or less when it is pressed. If less, a
             frame holds `full` minus what the board sends, and a board that sends
@@ -199,6 +196,23 @@ class Board(Value, frozen=True):
         banner: Lines of text at the beginning, ended by a line feed, that are no
             frames.
         calibration: What makes pressures of readings; readings stay without one.
+    """
+
+    order: Order = "rows"
+    pressure: Pressure = "rises"
+    port: Port = Port()
+    start: Start = Start()
+    banner: Lines = 0
+    calibration: Calibration | None = None
+
+
+class Board(Settings, frozen=True):
+    """A board: its sensor, its protocol and its port.
+
+    Attributes:
+        name: For people.
+        sensor: The matrix.
+        protocol: How a frame lies in the bytes.
 
     Raises:
         InvalidModelError: If the parts contradict each other; it lists everything.
@@ -207,12 +221,6 @@ class Board(Value, frozen=True):
     name: Annotated[str, Meta(min_length=1, max_length=1000)]
     sensor: Sensor
     protocol: Protocol
-    order: Order = "rows"
-    pressure: Pressure = "rises"
-    port: Port = Port()
-    start: Start = Start()
-    banner: Lines = 0
-    calibration: Calibration | None = None
 
     def __post_init__(self) -> None:
         """Refuse a board that contradicts itself."""
