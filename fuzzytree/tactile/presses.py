@@ -91,9 +91,11 @@ def labelled(
     """
     count = len(frames)
     return Recording(
-        Board("frames", sensor, Marker("AA 55", bits=sensor.bits)),
+        _plain(sensor),
         frames,
-        np.array(times) if len(times) else np.arange(count) / FRAMES_A_SECOND,
+        np.array(times, np.float64)
+        if len(times)
+        else np.arange(count) / FRAMES_A_SECOND,
         np.array(numbers if len(numbers) else range(count), np.int64),
         Counters(frames=count),
         label=np.array(label, np.int64),
@@ -101,6 +103,10 @@ def labelled(
         subject=np.array(subject, np.int64),
         is_stream=is_stream,
     )
+
+
+def _plain(sensor: Sensor) -> Board:
+    return Board("frames", sensor, Marker("AA 55", bits=sensor.bits))
 
 
 def _read_archive(path: PathLike, label: str) -> Recording:
@@ -119,30 +125,32 @@ def _read_archive(path: PathLike, label: str) -> Recording:
         raise ReadError(f"{name}: holds no frame")
     _check_sides(frames.shape[1:], name)
     names = _texts(arrays.get(f"{label}_names"), name, f"{label}_names")
-    labels = _codes(arrays.get(label), len(frames), name, label)
-    if len(labels) and not (labels.min() >= 0 and labels.max() < len(names)):
-        raise ReadError(
-            f"{name}: {label!r} holds places in {label + '_names'!r}, from 0 to "
-            f"{len(names) - 1}, not {labels.min()} to {labels.max()}"
-        )
-    subject = _codes(arrays.get("subject"), len(frames), name, "subject")
-    numbers = _codes(arrays.get("numbers"), len(frames), name, "numbers")
-    if (numbers < 0).any():
-        raise ReadError(f"{name}: 'numbers' must be 0 or more, not {numbers.min()}")
-    times = _times(arrays.get("times"), len(frames), name)
-    usual = _usual_full(frames)
-    full = _number(arrays.get("full"), usual, 1, 65535, f"{name}: 'full'")
-    least = _number(arrays.get("threshold"), 0, 0, full - 1, f"{name}: 'threshold'")
-    rows, columns = frames.shape[1:]
+    count, (rows, columns) = len(frames), frames.shape[1:]
+
+    def numbers(
+        title: str, count: int, low: int, high: int, what: str = "whole numbers"
+    ) -> npt.NDArray[Any]:
+        found = np.atleast_1d(arrays.get(title, np.zeros(0, np.int64)))
+        is_fit = found.shape == (count,) and found.dtype.kind != "U"
+        if title in arrays and not (
+            is_fit and ((found >= low) & (found <= high)).all()
+        ):
+            text = f"must hold {what} from {low} to {high}, {count} in all"
+            raise ReadError(f"{name}: {title!r} {text}")
+        return found
+
+    full = int([*numbers("full", 1, 1, 65535), _usual_full(frames)][0])
+    threshold = int([*numbers("threshold", 1, 0, full - 1), 0][0])
+    places = f"places in '{label}_names'"
     return labelled(
         frames,
-        Sensor(rows, columns, full, least),
-        labels,
+        Sensor(rows, columns, full, threshold),
+        numbers(label, count, 0, len(names) - 1, places),
         names,
-        subject,
-        times=times,
-        numbers=numbers,
-        is_stream=len(times) > 0,
+        numbers("subject", count, -(2**63), 2**63 - 1),
+        times=numbers("times", count, 0, _MOST["time"], "seconds"),
+        numbers=numbers("numbers", count, 0, _MOST["number"]),
+        is_stream="times" in arrays,
     )
 
 
@@ -245,45 +253,6 @@ def _texts(found: npt.NDArray[Any] | None, name: str, title: str) -> tuple[str, 
     return texts
 
 
-def _codes(
-    found: npt.NDArray[Any] | None, count: int, name: str, title: str
-) -> npt.NDArray[np.int64]:
-    if found is None:
-        return np.zeros(0, np.int64)
-    if found.shape != (count,) or found.dtype.kind not in "iu":
-        raise ReadError(
-            f"{name}: {title!r} must hold a whole number for each of {count} frames"
-        )
-    return found.astype(np.int64)
-
-
-def _times(
-    found: npt.NDArray[Any] | None, count: int, name: str
-) -> npt.NDArray[np.float64]:
-    if found is None:
-        return np.zeros(0, np.float64)
-    times = found.astype(np.float64)
-    most = _MOST["time"]
-    if times.shape != (count,) or not ((times >= 0.0) & (times <= most)).all():
-        raise ReadError(
-            f"{name}: 'times' must hold a number of seconds from 0 to {most} for each "
-            f"of {count} frames"
-        )
-    return times
-
-
-def _number(
-    found: npt.NDArray[Any] | None, usual: int, low: int, high: int, where: str
-) -> int:
-    """Return a whole number of an archive, or the usual one where it has none."""
-    if found is None:
-        return usual
-    is_one = found.size == 1 and found.dtype.kind in "iu"
-    if not is_one or not low <= found.item() <= high:
-        raise ReadError(f"{where} must be a whole number from {low} to {high}")
-    return int(found.item())
-
-
 def open_frames(
     path: PathLike,
     board: Board | None = None,
@@ -325,7 +294,7 @@ def open_frames(
             given = {"full": full, "threshold": threshold}
             stated = {key: one for key, one in given.items() if one is not None}
             sensor = structs.replace(found.sensor, **stated)
-            board = Board("frames", sensor, Marker("AA 55", bits=sensor.bits))
+            board = _plain(sensor)
         check_frames(board.sensor, found.frames)
     except (InvalidModelError, TableError) as error:
         raise ReadError(f"{name}: {error}") from error

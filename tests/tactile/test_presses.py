@@ -81,11 +81,11 @@ def test_classes_may_stand_under_another_name(tmp_path: Path) -> None:
         ),
         (
             {"frames": FRAMES, "label": [0, 2], "label_names": ["a", "b"]},
-            "'label' holds places in 'label_names', from 0 to 1, not 0 to 2",
+            "'label' must hold places in 'label_names' from 0 to 1, 2 in all",
         ),
         (
             {"frames": FRAMES, "label": [0], "label_names": ["a"]},
-            "'label' must hold a whole number for each of 2 frames",
+            "'label' must hold places in 'label_names' from 0 to 0, 2 in all",
         ),
         (
             {"frames": FRAMES, "label_names": ["a", "a"]},
@@ -93,20 +93,19 @@ def test_classes_may_stand_under_another_name(tmp_path: Path) -> None:
         ),
         (
             {"frames": FRAMES, "full": 70000},
-            "'full' must be a whole number from 1 to 65535",
+            "'full' must hold whole numbers from 1 to 65535, 1 in all",
         ),
         (
             {"frames": FRAMES, "full": 9, "threshold": 9},
-            "'threshold' must be a whole number from 0 to 8",
+            "'threshold' must hold whole numbers from 0 to 8, 1 in all",
         ),
         (
             {"frames": FRAMES, "times": [0.0, -1.0]},
-            "'times' must hold a number of seconds from 0 to 8589934592 for each of 2 "
-            "frames",
+            "'times' must hold seconds from 0 to 8589934592, 2 in all",
         ),
         (
             {"frames": FRAMES, "numbers": [0, -1]},
-            "'numbers' must be 0 or more, not -1",
+            "'numbers' must hold whole numbers from 0 to 9007199254740991, 2 in all",
         ),
         (
             {"frames": FRAMES, "subject": np.array([{}, {}])},
