@@ -90,12 +90,11 @@ def labelled(
     Without times there are 44 frames a second, and without numbers they are 0, 1, ...
     """
     count = len(frames)
+    seconds = times if len(times) else np.arange(count) / FRAMES_A_SECOND
     return Recording(
         _plain(sensor),
         frames,
-        np.array(times, np.float64)
-        if len(times)
-        else np.arange(count) / FRAMES_A_SECOND,
+        np.array(seconds, np.float64),
         np.array(numbers if len(numbers) else range(count), np.int64),
         Counters(frames=count),
         label=np.array(label, np.int64),

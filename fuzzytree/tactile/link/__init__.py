@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, assert_never
+from typing import TYPE_CHECKING, Final, Literal, assert_never
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from fuzzytree.tactile.link.decoder import Decoder
 from fuzzytree.tactile.link.fixed import RequestDecoder
 from fuzzytree.tactile.link.markers import MarkerDecoder
 from fuzzytree.tactile.link.sentinels import SentinelDecoder
-from fuzzytree.tactile.link.starting import measured, remarks
+from fuzzytree.tactile.link.starting import Started, measured
 from fuzzytree.tactile.link.texts import TextDecoder
 from fuzzytree.tactile.link.watching import PATIENCE_S, Watch
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from serial import Serial
 
 
-__all__ = ["Decoder", "decoder_of"]
+__all__ = ["Decoder", "Started", "decoder_of"]
 
 
 def decoder_of(board: Board, *, is_joined: bool = False) -> Decoder:
@@ -145,13 +145,6 @@ def room(board: Board) -> int:
     return min(max(_WAITING_BYTES // size, MOST_WAITING), 4096)
 
 
-class Started(NamedTuple):
-    """A board as it is at rest, and what is odd about it, in sentences."""
-
-    board: Board
-    remarks: list[str]
-
-
 def start(board: Board, frames: Iterable[Frame]) -> Started:
     """Measure what a sensor reads at rest, from the first frames that come.
 
@@ -167,8 +160,7 @@ def start(board: Board, frames: Iterable[Frame]) -> Started:
     if len(found) < count:
         text = f"the baseline needs {count} frames, and only {len(found)} came"
         raise PortError(f"{board.name}: {text}")
-    cells = np.array(found)
-    return Started(measured(board, cells), remarks(board, cells))
+    return measured(board, np.array(found))
 
 
 class Connection(contextlib.AbstractContextManager["Connection"]):

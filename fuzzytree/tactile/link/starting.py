@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -17,12 +18,23 @@ Places = npt.NDArray[np.bool_]
 _MOST_NAMED = 8  # cells in a sentence
 
 
-def measured(board: Board, frames: Cells) -> Board:
+class Started(NamedTuple):
+    """A board as it is at rest, and what is odd about it, in sentences."""
+
+    board: Board
+    remarks: list[str]
+
+
+def measured(board: Board, frames: Cells) -> Started:
     """Return a board with the baseline that frames show, and its hot cells masked.
 
     The baseline of a cell is the median of what it reads (the mean of the middle two,
     rounded down, if their number is even). A cell whose baseline is above the share
     `start.hot` of full is masked, beside those that are masked already.
+
+    Nothing should lie on the sensor. Odd are hot cells, something that lies on it or
+    touches it, and cells that never move though both neighbours do: these may be dead,
+    and are not masked.
 
     Raises:
         TableError: If there is no frame, or they are of another size.
@@ -31,36 +43,18 @@ def measured(board: Board, frames: Cells) -> Board:
         >>> from fuzzytree.tactile.boards import Marker
         >>> from fuzzytree.tactile.sensor import Sensor
         >>> frames = np.array([[[3, 200]], [[4, 201]]])
-        >>> found = measured(Board("mat", Sensor(1, 2), Marker("AA")), frames)
-        >>> found.sensor.baseline, found.sensor.masked
-        ((3, 200), ((0, 1),))
+        >>> found, remarks = measured(Board("mat", Sensor(1, 2), Marker("AA")), frames)
+        >>> found.sensor.baseline, found.sensor.masked, remarks
+        ((3, 200), ((0, 1),), ['at rest above 50% of full, masked: r0 c1'])
     """
-    baseline = _baseline(board, frames)
-    known = board.sensor.masked
-    hot = [place for place in places(_hot(board, baseline)) if place not in known]
-    sensor = msgspec.structs.replace(
-        board.sensor,
-        baseline=tuple(baseline.reshape(-1).tolist()),
-        masked=(*known, *hot),
-    )
-    return msgspec.structs.replace(board, sensor=sensor)
-
-
-def remarks(board: Board, frames: Cells) -> list[str]:
-    """Return what is odd about a sensor on which nothing should lie.
-
-    Hot cells, something that lies on it or touches it, and cells that never move
-    though both neighbours do: these may be dead, and are not masked.
-
-    Raises:
-        TableError: If there is no frame, or they are of another size.
-    """
-    found = check_frames(board.sensor, frames)
-    baseline = _baseline(board, frames)
-    is_hot = _hot(board, baseline)
-    spread = found.max(axis=0).astype(np.int64) - found.min(axis=0)
-    spread[is_masked(board.sensor)] = 0
-    is_touched = spread > board.sensor.full // 4
+    sensor, found = board.sensor, check_frames(board.sensor, frames)
+    if not len(found):
+        raise TableError("a baseline needs 1 frame or more, not 0")
+    cells = found.clip(0, sensor.full).astype(np.int64)
+    baseline = np.median(cells, axis=0).astype(np.int64)
+    known = is_masked(sensor)
+    is_hot = (baseline > board.start.hot * sensor.full) & ~known
+    is_touched = (np.ptp(found.astype(np.int64), axis=0) > sensor.full // 4) & ~known
     says: list[str] = []
     if is_hot.any():
         share = f"{board.start.hot:.0%} of full"
@@ -74,7 +68,12 @@ def remarks(board: Board, frames: Cells) -> list[str]:
     if is_still.any():
         text = "never moved though both neighbours did (dead?), not masked"
         says.append(f"{text}: {named(places(is_still))}")
-    return says
+    changes = {
+        "baseline": tuple(baseline.reshape(-1).tolist()),
+        "masked": (*sensor.masked, *places(is_hot)),
+    }
+    sensor = msgspec.structs.replace(sensor, **changes)
+    return Started(msgspec.structs.replace(board, sensor=sensor), says)
 
 
 def still(board: Board, frames: Cells) -> Places:
@@ -101,20 +100,3 @@ def named(places: Sequence[tuple[int, int]]) -> str:
     names = [f"r{row} c{column}" for row, column in places[:_MOST_NAMED]]
     more = len(places) - len(names)
     return f"{', '.join(names)}{f' and {more} more' if more else ''}"
-
-
-def _baseline(board: Board, frames: Cells) -> npt.NDArray[np.int64]:
-    found = check_frames(board.sensor, frames)
-    if not len(found):
-        raise TableError("a baseline needs 1 frame or more, not 0")
-    ordered = np.sort(found, axis=0).clip(0, board.sensor.full).astype(np.int64)
-    middle = len(ordered) // 2
-    lower = ordered[middle - 1] if len(ordered) % 2 == 0 else ordered[middle]
-    baseline: npt.NDArray[np.int64] = (lower + ordered[middle]) // 2
-    return baseline
-
-
-def _hot(board: Board, baseline: npt.NDArray[np.int64]) -> Places:
-    """Return which cells rest too high, of those that are not masked already."""
-    is_hot: Places = baseline > board.start.hot * board.sensor.full
-    return is_hot & ~is_masked(board.sensor)

@@ -8,7 +8,7 @@ import pytest
 from fuzzytree.errors import TableError
 from fuzzytree.tactile.boards import Board, Marker, Start
 from fuzzytree.tactile.link import start
-from fuzzytree.tactile.link.starting import measured, remarks, still
+from fuzzytree.tactile.link.starting import measured, still
 from fuzzytree.tactile.sensor import Cells, Frame, Sensor, pressed
 
 BOARD = Board("mat", Sensor(3, 4), Marker("AA 55"))
@@ -21,10 +21,10 @@ def _resting(count: int = 9) -> Cells:
 
 
 def test_a_baseline_is_the_median_of_each_cell() -> None:
-    found = measured(BOARD, _resting())
+    found = measured(BOARD, _resting()).board
     assert found.sensor.baseline == tuple(range(11, 23))
     assert found.sensor.masked == ()
-    assert remarks(BOARD, _resting()) == []
+    assert measured(BOARD, _resting()).remarks == []
     assert not pressed(found.sensor, _resting()[1]).any()
 
 
@@ -37,26 +37,26 @@ def test_a_median_is_rounded_down_and_lies_within_full(
 ) -> None:
     board = Board("mat", Sensor(1, 1), Marker("AA 55"), start=Start(hot=1.0))
     frames = np.array(values).reshape(-1, 1, 1)
-    assert measured(board, frames).sensor.baseline == (median,)
+    assert measured(board, frames).board.sensor.baseline == (median,)
 
 
 def test_a_hot_cell_is_masked_once_and_reported() -> None:
     frames = _resting()
     frames[:, 1, 2] = 200
-    board = measured(BOARD, frames)
+    board = measured(BOARD, frames).board
     assert board.sensor.masked == ((1, 2),)
-    assert measured(board, frames).sensor.masked == ((1, 2),)
-    assert remarks(BOARD, frames) == [
+    assert measured(board, frames).board.sensor.masked == ((1, 2),)
+    assert measured(BOARD, frames).remarks == [
         "at rest above 50% of full, masked: r1 c2",
         "never moved though both neighbours did (dead?), not masked: r1 c2",
     ]
-    assert remarks(board, frames) == []
+    assert measured(board, frames).remarks == []
 
 
 def test_something_that_lies_on_the_sensor_is_reported() -> None:
     frames = _resting()
     frames[:, :, 1:] += 150
-    assert remarks(BOARD, frames) == [
+    assert measured(BOARD, frames).remarks == [
         "at rest above 50% of full, masked: r0 c1, r0 c2, r0 c3, r1 c1, r1 c2, r1 c3, "
         "r2 c1, r2 c2 and 1 more",
         "some of these lie side by side: does something lie on the sensor?",
@@ -66,19 +66,19 @@ def test_something_that_lies_on_the_sensor_is_reported() -> None:
 def test_a_touch_while_the_baseline_is_taken_is_reported() -> None:
     frames = _resting()
     frames[3, 0, 0] = 100
-    assert remarks(BOARD, frames) == [
+    assert measured(BOARD, frames).remarks == [
         "moved by more than a quarter of full (was the sensor touched?): r0 c0"
     ]
-    assert measured(BOARD, frames).sensor.baseline[0] == 11
+    assert measured(BOARD, frames).board.sensor.baseline[0] == 11
 
 
 def test_a_dead_cell_is_reported_and_not_masked() -> None:
     frames = _resting()
     frames[:, 2, 2] = 0
-    assert remarks(BOARD, frames) == [
+    assert measured(BOARD, frames).remarks == [
         "never moved though both neighbours did (dead?), not masked: r2 c2"
     ]
-    assert measured(BOARD, frames).sensor.masked == ()
+    assert measured(BOARD, frames).board.sensor.masked == ()
 
 
 @pytest.mark.parametrize("place", [np.s_[1], np.s_[:, 2]])
@@ -101,8 +101,8 @@ def test_bytes_as_a_board_sends_them_do_not_wrap_around() -> None:
     frames = np.full((2, 3, 4), 255, np.uint8)
     frames[1] = 254
     board = Board("mat", Sensor(3, 4), Marker("AA 55"), start=Start(hot=1.0))
-    assert set(measured(board, frames).sensor.baseline) == {254}
-    assert remarks(board, frames) == []
+    assert set(measured(board, frames).board.sensor.baseline) == {254}
+    assert measured(board, frames).remarks == []
 
 
 def test_a_baseline_of_nothing_is_refused() -> None:
