@@ -22,12 +22,12 @@ and t the distance to the nearest line through the centres of cells:
 
 from __future__ import annotations
 
-import functools
 import operator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 from fuzzytree.errors import TableError
 
@@ -101,33 +101,28 @@ def interpolated(
     *many, rows, columns = found.shape
     whole = np.empty((*many, times * rows, times * columns), kind)
     frames = found.reshape(-1, rows, columns)
-    if frames.size:
-        plan = _plan(rows, columns, times, kind.name)
-        points = whole.reshape(-1, rows, times, columns * times)
-        block = max(1, _BLOCK // points[0].size)
-        for first in range(0, len(frames), block):
-            part = slice(first, first + block)
-            _interpolate(frames[part].astype(kind), plan, points[part])
+    points = whole.reshape(-1, times * rows, times * columns)
+    step = max(1, _BLOCK // (times * rows * times * columns))
+    for first in range(0, len(frames), step):
+        part = slice(first, first + step)
+        points[part] = _points(frames[part], times, kind)
     return whole
 
 
-def _interpolate(cells: Any, plan: _Plan, points: Any) -> None:
-    """Write the points of some frames, by row, phase and column of points."""
-    count, rows, times, width = points.shape
-    bordered = cells.take(plan.rows, axis=1)
-    left = bordered.take(plan.left, axis=2)[:, :, None]
-    right = bordered.take(plan.right, axis=2)[:, :, None]
-    corners = left[:, :-1], right[:, :-1], left[:, 1:], right[:, 1:]
-    upper_left, upper_right, lower_left, lower_right = (
-        corner * weight for corner, weight in zip(corners, plan.cells, strict=True)
-    )
-    # diagonals first: the same for turned or mirrored frames
-    upper_left += lower_right
-    upper_right += lower_left
-    upper_left += upper_right
-    skip = slice(plan.skip, plan.skip + rows * times)
-    inner = upper_left.reshape(count, -1, width)[:, skip].reshape(points.shape)
-    np.divide(inner, plan.sums, out=points)
+def _points(
+    frames: npt.NDArray[np.integer], times: int, kind: np.dtype[Any]
+) -> npt.NDArray[Any]:
+    """Return the points of some frames, of shape (frames, rows, columns)."""
+    count, rows, columns = frames.shape
+    around = np.pad(frames.astype(kind), ((0, 0), (1, 1), (1, 1)), "edge")
+    corners = sliding_window_view(around, (2, 2), (1, 2))
+    degrees, sums = weights(times)
+    values = corners.reshape(-1, 4) @ degrees.reshape(4, -1).astype(kind)
+    values /= sums.reshape(-1).astype(kind)
+    turned = values.reshape(count, rows + 1, columns + 1, times, times).swapaxes(2, 3)
+    dense = turned.reshape(count, (rows + 1) * times, (columns + 1) * times)
+    skip = (times + 1) // 2  # from the centre of the border to the first point
+    return dense[:, skip : skip + rows * times, skip : skip + columns * times]
 
 
 def _checked(cells: Any, times: int, kind: np.dtype[Any]) -> npt.NDArray[Any]:
@@ -148,40 +143,3 @@ def _checked(cells: Any, times: int, kind: np.dtype[Any]) -> npt.NDArray[Any]:
     if found.size and not -most <= int(found.min()) <= int(found.max()) <= most:
         raise TableError(f"cells lie in {-most} to {most}, for {times} times as {kind}")
     return found
-
-
-class _Plan(NamedTuple):
-    """What is the same for all frames of one size.
-
-    Attributes:
-        rows: The rows of cells, with the border once more on each side.
-        left: The column of cells left of each column of points.
-        right: The one right of it, or the same on a centre.
-        cells: The weights, by phase downwards and column of points.
-        sums: What to divide by, for each phase of a cell.
-        skip: Rows of points that lie before the first cell.
-    """
-
-    rows: npt.NDArray[np.intp]
-    left: npt.NDArray[np.intp]
-    right: npt.NDArray[np.intp]
-    cells: npt.NDArray[Any]
-    sums: npt.NDArray[Any]
-    skip: int
-
-
-@functools.lru_cache(maxsize=16)
-def _plan(rows: int, columns: int, times: int, kind: str) -> _Plan:
-    skip = (times + 1) // 2  # from the centre of the border to the first point
-    points = np.arange(columns * times) + skip
-    before, phases = points // times - 1, points % times
-    is_centre = (phases == 0) & (times % 2 == 1)
-    cells, sums = weights(times)
-    return _Plan(
-        np.clip(np.arange(-1, rows + 1), 0, rows - 1),
-        np.clip(before, 0, columns - 1),
-        np.clip(np.where(is_centre, before, before + 1), 0, columns - 1),
-        cells[:, :, phases].astype(kind),
-        np.roll(sums, -skip, axis=0)[:, phases].astype(kind),
-        skip,
-    )
