@@ -94,8 +94,21 @@ class Decoder(ABC):
         """Return the frames that only waited for more, and begin again."""
 
     def _pass_banner(self) -> int:
-        """Skip what there is of the banner; return how many bytes that was."""
-        taken, self._banner = banner_bytes(bytes(self._buffer), self._banner)
+        """Skip what there is of the banner; return how many bytes that was.
+
+        Bytes that are no text end the banner, also in the middle of a line, and so
+        does a line of more than 1000 bytes.
+        """
+        data, taken = bytes(self._buffer), 0
+        while self._banner:
+            end = data.find(b"\n", taken)
+            line = data[taken:] if end < 0 else data[taken:end]
+            if line.translate(None, _TEXT) or len(line) > _LONGEST_BANNER_LINE:
+                self._banner = 0
+            elif end < 0:
+                break
+            else:
+                taken, self._banner = end + 1, self._banner - 1
         self._skip(taken)
         return taken
 
@@ -122,33 +135,3 @@ def largest_cell(board: Board) -> int:
     """Return the most that a cell of a whole frame can hold, as it was sent."""
     sensor = board.sensor
     return sensor.full if board.pressure == "falls" else sensor.largest
-
-
-def banner_bytes(data: bytes, lines: int) -> tuple[int, int]:
-    r"""Return how many bytes are lines of text, and how many lines may still come.
-
-    Bytes that are no text end the banner, also in the middle of a line, and so does a
-    line of more than 1000 bytes.
-
-    Args:
-        data: The bytes from the beginning on, or from the last whole line on.
-        lines: How many lines may come.
-
-    Returns:
-        The bytes of whole lines; and the lines that may follow, 0 if what follows
-        is no text.
-
-    Example:
-        >>> banner_bytes(b"mat\r\nready", 2), banner_bytes(b"mat\n\x01\x02", 2)
-        ((5, 1), (4, 0))
-    """
-    taken = 0
-    while lines:
-        end = data.find(b"\n", taken)
-        line = data[taken:] if end < 0 else data[taken:end]
-        if line.translate(None, _TEXT) or len(line) > _LONGEST_BANNER_LINE:
-            return taken, 0
-        if end < 0:
-            break
-        taken, lines = end + 1, lines - 1
-    return taken, lines

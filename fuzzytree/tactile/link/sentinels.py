@@ -25,28 +25,27 @@ class SentinelDecoder(Decoder):
         self._protocol = protocol
         self._end = bytes([protocol.end])
         self._cells = board.sensor.rows * board.sensor.columns
-        self._is_joined = is_joined
-        self._is_astray = False  # inside a frame that is longer than any
+        self._is_astray = is_joined  # inside a frame that is longer than any, or cut
 
     def _take(self) -> list[Cells]:
         if self._banner:
-            self._is_joined &= not self._pass_banner()
+            self._is_astray &= not self._pass_banner()
             if self._banner:
                 return []
         stop = self._buffer.rfind(self._end) + 1
-        if self._is_astray or self._is_joined:
+        if self._is_astray:
             start = self._buffer.find(self._end) + 1
             if start:
                 self._skip(start)
                 stop -= start
-                self._is_astray = self._is_joined = False
+                self._is_astray = False
         frames: list[Cells] = []
         if stop:
             data = bytes(self._buffer[:stop])
             del self._buffer[:stop]
             frames = self._decoded(np.frombuffer(data, np.uint8))
         if len(self._buffer) > 2 * self._cells:  # longer than any frame
-            self.counters.damaged += not (self._is_astray or self._is_joined)
+            self.counters.damaged += not self._is_astray
             self._is_astray = True
             self._skip(len(self._buffer))
         return frames
@@ -79,8 +78,7 @@ class SentinelDecoder(Decoder):
         return self._frames(np.repeat(values, counts))
 
     def _take_last(self) -> list[Cells]:
-        is_begun = bool(self._buffer) and not (self._is_astray or self._is_joined)
-        self.counters.damaged += is_begun
+        self.counters.damaged += bool(self._buffer) and not self._is_astray
         self._banner = self._board.banner
         self._is_astray = False
         return []
