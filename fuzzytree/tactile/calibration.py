@@ -77,20 +77,17 @@ class Calibration(Value, FileRecord, frozen=True, dict=True):
         found: FloatArray = np.array([(0.0, 0.0), *self.points]).T
         return found
 
-    def pressures(self, readings: npt.NDArray[np.integer]) -> FloatArray:
+    def pressures(self, readings: npt.ArrayLike) -> FloatArray:
         """Return the pressures of readings over the baseline, without gains."""
-        return self._at(readings.astype(np.float64))
-
-    def _at(self, readings: FloatArray) -> FloatArray:
         x, y = self._curve
         slope = (y[-1] - y[-2]) / (x[-1] - x[-2])
-        over = np.maximum(readings - x[-1], 0.0) * slope
+        over = np.maximum(np.asarray(readings, np.float64) - x[-1], 0.0) * slope
         found: FloatArray = np.interp(readings, x, y) + over
         return found
 
     def top(self, full: int) -> float:
         """Return the pressure of a cell that reads full, which is `STEPS`."""
-        return float(self._at(np.array([float(full)]))[0])
+        return float(self.pressures([full])[0])
 
     def steps(self, pressed: npt.NDArray[np.int64], full: int) -> npt.NDArray[np.int64]:
         """Return pressures of a frame in steps, at least 1 where a cell presses.
@@ -102,7 +99,7 @@ class Calibration(Value, FileRecord, frozen=True, dict=True):
         values = pressed.astype(np.float64)
         if self.gains:
             values = values * np.array(self.gains).reshape(values.shape)
-        shares = self._at(np.minimum(values, full)) / self.top(full)
+        shares = self.pressures(np.minimum(values, full)) / self.top(full)
         found: npt.NDArray[np.int64] = np.rint(shares * STEPS).astype(np.int64)
         np.maximum(found, pressed > 0, out=found)
         return found

@@ -1,13 +1,8 @@
 """Labelled frames in numpy archives (`.npz`), and frames of any file with their sensor.
 
-The arrays: `frames`, whole numbers of shape (frames, rows, columns); `full`, the
-reading of a saturated cell; `threshold`, above which a cell is pressed, default 0; and,
-where known, `label`, the index of each frame's class in `label_names`, `subject`,
-a number for each person or object that pressed, and `times`, in seconds, and `numbers`
-of frames that follow each other.
-
-A table (`.csv`) has a line for each frame, with the columns `time`, `number`, `r0c0`,
-`r0c1` and so on; the first two may be missing.
+`docs/reference/recordings.md` has the arrays of an archive and the columns of a table.
+`label` is the index of each frame's class in `label_names`, and `subject` a number for
+each person or object that pressed.
 """
 
 from __future__ import annotations
@@ -64,10 +59,7 @@ _BROKEN_HEADER = (
     *(ValueError, KeyError, TypeError, SyntaxError, tokenize.TokenError),
     *(MemoryError, RecursionError),
 )
-_USED = (
-    *("frames", "full", "threshold", "label", "label_names", "subject"),
-    *("times", "numbers"),
-)
+_USED = {"frames", "full", "threshold", "subject", "times", "numbers"}
 _TABLE = ".csv"
 _CELL = re.compile("r(0|[1-9][0-9]{0,2})c(0|[1-9][0-9]{0,2})")
 _MOST = {"time": 2**33, "number": 2**53 - 1}
@@ -193,7 +185,7 @@ def presses_content(found: Recording) -> bytes:
 
 def _arrays(content: bytes, name: str, label: str) -> Mapping[str, npt.NDArray[Any]]:
     """Return the arrays that are used, unpacked within the limit."""
-    wanted = {*_USED, label, f"{label}_names"}
+    wanted = _USED | {label, f"{label}_names"}
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = archive.infolist()
@@ -292,8 +284,7 @@ def open_frames(
         if board is None:
             given = {"full": full, "threshold": threshold}
             stated = {key: one for key, one in given.items() if one is not None}
-            sensor = structs.replace(found.sensor, **stated)
-            board = _plain(sensor)
+            board = _plain(structs.replace(found.sensor, **stated))
         check_frames(board.sensor, found.frames)
     except (InvalidModelError, TableError) as error:
         raise ReadError(f"{name}: {error}") from error

@@ -45,12 +45,6 @@ class Layout(msgspec.Struct, frozen=True):
     largest: int
 
     @property
-    def size(self) -> int:
-        """The bytes of a frame."""
-        check = _CHECKSUM_BYTES[self.checksum]
-        return self.cells_from + self.cell_bytes + check + len(self.tail)
-
-    @property
     def cells_from(self) -> int:
         """Where the cells begin."""
         return len(self.head) + self.skip
@@ -59,6 +53,11 @@ class Layout(msgspec.Struct, frozen=True):
     def proof_bytes(self) -> int:
         """Number of bytes at the end that prove a whole frame."""
         return _CHECKSUM_BYTES[self.checksum] + len(self.tail)
+
+    @property
+    def size(self) -> int:
+        """The bytes of a frame."""
+        return self.cells_from + self.cell_bytes + self.proof_bytes
 
 
 def layout_of(board: Board, protocol: Marker | Request) -> Layout:
@@ -73,22 +72,18 @@ def layout_of(board: Board, protocol: Marker | Request) -> Layout:
     """
     sign = "<" if protocol.byte_order == "little" else ">"
     sensor = board.sensor
-    head, checked_from, tail = b"", 0, b""
-    if isinstance(protocol, Marker):
-        head = bytes.fromhex(protocol.marker)
-        checked_from = len(head)
-        if protocol.sizes != "none":
-            sizes = np.array([sensor.rows, sensor.columns], f"{sign}u2")
-            head += sizes.tobytes()
-        tail = bytes.fromhex(protocol.tail)
+    marker = bytes.fromhex(getattr(protocol, "marker", ""))
+    sizes = b""
+    if getattr(protocol, "sizes", "none") != "none":
+        sizes = np.array([sensor.rows, sensor.columns], f"{sign}u2").tobytes()
     return Layout(
-        head=head,
+        head=marker + sizes,
         skip=protocol.skip,
         cell_bytes=sensor.rows * sensor.columns * protocol.bits // 8,
         dtype="u1" if protocol.bits == 8 else f"{sign}u2",
         checksum=protocol.checksum,
-        checked_from=checked_from,
-        tail=tail,
+        checked_from=len(marker),
+        tail=bytes.fromhex(getattr(protocol, "tail", "")),
         largest=largest_cell(board),
     )
 

@@ -69,7 +69,6 @@ LARGEST_ARRAY: Final = 2**31
 """The most bytes of cells that `read_recording` holds at once."""
 
 _NS = 1_000_000_000
-_COUNTERS = len(fields(Counters))
 _PATIENCE = 8  # how often each byte may be looked at,
 _TRIES_BYTES = 2**24  # beside these
 _CHUNK = 2**20
@@ -99,18 +98,10 @@ def fixed_part(
     board: Board, board_bytes: int, started_ns: int, version: int = VERSIONS[-1]
 ) -> bytes:
     """Return the part of the header that is of the same length in every file."""
-    fields = (
-        MAGIC,
-        version,
-        board.sensor.rows,
-        board.sensor.columns,
-        board.sensor.dtype.itemsize,
-        _COUNTERS,
-        layout_of(board).itemsize,
-        board_bytes,
-        started_ns,
-    )
-    return np.array(fields, FIXED).tobytes()
+    sensor, record = board.sensor, layout_of(board)
+    sizes = (sensor.rows, sensor.columns, sensor.dtype.itemsize, len(fields(Counters)))
+    rest = (record.itemsize, board_bytes, started_ns)
+    return np.array((MAGIC, version, *sizes, *rest), FIXED).tobytes()
 
 
 def layout_of(board: Board) -> np.dtype[np.void]:
@@ -121,7 +112,7 @@ def layout_of(board: Board) -> np.dtype[np.void]:
             ("mark", "S4"),
             ("number", "<i8"),
             ("time_ns", "<i8"),
-            ("counters", "<i8", (_COUNTERS,)),
+            ("counters", "<i8", (len(fields(Counters)),)),
             ("cells", board.sensor.dtype, shape),
             ("crc", "<u4"),
         ]
@@ -150,25 +141,15 @@ def _packed_rest(
     return _packed(board, replace(frame, cells=cells), counters, REST)
 
 
-def _rest_sensor(sensor: Sensor, cells: Cells) -> Sensor:
-    """Return a sensor with what its cells read at rest."""
-    is_hot = cells >= sensor.largest
-    found = np.where(is_hot, 0, np.minimum(cells, sensor.full)).astype(np.int64)
-    return at_rest(sensor, found, is_hot)
-
-
 def _unpacked(content: bytes, layout: np.dtype[np.void]) -> FrameRecord | None:
     """Return a record, or None if the bytes are none, or a damaged one."""
     if not content.startswith((MARK, REST)) or content[-4:] != crc(content[:-4]):
         return None
-    fields = np.frombuffer(content, layout)[0]
-    counters, time_ns = fields["counters"].tolist(), int(fields["time_ns"])
-    number = int(fields["number"])
+    _mark, number, time_ns, counters, cells, _crc = np.frombuffer(content, layout)[0]
     if min(number, time_ns, *counters) < 0:
         return None
-    return FrameRecord(
-        Frame(fields["cells"], time_ns / _NS, number), Counters(*counters)
-    )
+    frame = Frame(cells, int(time_ns) / _NS, int(number))
+    return FrameRecord(frame, Counters(*counters.tolist()))
 
 
 def crc(content: bytes) -> bytes:
@@ -250,10 +231,9 @@ class Recording(_Closing):
 class Recorder(_Closing):
     """Write frames to a file, so that at most the last one can be lost.
 
-    Each frame goes to the system in one piece: whatever ends this program, it is in
-    the file. A thread syncs the file to the disk, without pause while there are new
-    frames: if the power fails, the frames that came since the last answer
-    are lost (`most_at_risk` is the largest number so far).
+    Each frame goes to the system in one piece. A thread syncs the file to the disk: if
+    the power fails, the frames since the last answer of the disk are lost
+    (`most_at_risk` is the largest number so far).
 
     Args:
         path: A file that is not there yet.
@@ -420,8 +400,7 @@ class RecordingFile(_Closing):
                     is_rest = window.startswith(REST, at)
                     at += length
                     if is_rest:
-                        cells = record.frame.cells
-                        self.sensor = _rest_sensor(self.board.sensor, cells)
+                        self._rest(record.frame.cells)
                     else:
                         yield record
                     continue
@@ -438,6 +417,16 @@ class RecordingFile(_Closing):
         lost += len(window)
         self.damaged += lost // length
         self.cut_bytes = lost % length
+
+    def _rest(self, cells: Cells) -> None:
+        """Take what the cells read at rest from now on; hot and dead ones the largest.
+
+        They stay within what a sensor may have.
+        """
+        known = self.board.sensor
+        is_masked = cells >= known.largest
+        rests = np.where(is_masked, 0, np.minimum(cells, known.full)).astype(np.int64)
+        self.sensor = at_rest(known, rests, is_masked)
 
     def whole(self) -> Recording:
         """Return all frames.
