@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from msgspec import Meta, structs
 
-from fuzzytree.errors import InvalidModelError, ReadError
+from fuzzytree.errors import InvalidModelError
 from fuzzytree.exporters import Entry, Noted, Short, joined
 from fuzzytree.files import PathLike, read_bounded
 from fuzzytree.formats import (
@@ -25,13 +25,12 @@ from fuzzytree.tactile.boards import (
     Board,
     Byte,
     Marker,
+    Port,
     Request,
     Sentinel,
     Settings,
-    Start,
     Text,
 )
-from fuzzytree.tactile.calibration import Calibration
 from fuzzytree.tactile.sensor import LARGEST_SIDE, Full, Sensor, Side
 
 BOARD_FORMAT: Final = "fuzzytree-board/1"
@@ -59,13 +58,16 @@ class SensorOfBoard(FileRecord, frozen=True, kw_only=True):
     ] = ()
 
 
-_FAMILIES: Final = {
-    "marker": "marker",
-    "sentinel": "end zero",
-    "request": "ask",
-    "text": "frame",
+_FAMILIES: Final = ("marker", "sentinel", "request", "text")
+_ALWAYS: Final[dict[type, str]] = {
+    Sensor: "rows columns full",
+    Marker: "marker",
+    Sentinel: "end zero",
+    Request: "ask",
+    Text: "frame",
+    Port: "baud",
 }
-"""Of each family: the fields that are always written."""
+"""The fields of a record that are always written."""
 
 
 class BoardFile(FileRecord, Settings, frozen=True):
@@ -118,9 +120,6 @@ def read_board(content: bytes, name: str) -> Board:
         Marker(marker='AA 55', bits=8, byte_order='little', sizes='none', skip=0, \
 checksum='none', tail='')
     """
-    if len(content) > MOST_BYTES:
-        text = f"{len(content):,} bytes are more than the {MOST_BYTES:,} of a board"
-        raise ReadError(f"{name}: {text}")
     root, found = mapping_of_format(content, name, BOARD_FORMAT, "board")
     file = record(entries(root, BoardFile, found), BoardFile, found)
     if file is None or found:
@@ -173,49 +172,29 @@ def board_text(board: Board) -> str:
     entries: dict[str, Entry] = {
         "format": BOARD_FORMAT,
         "name": board.name,
-        "sensor": _sensor_entry(board.sensor),
-        family: Short(_changed(board.protocol, _FAMILIES[family])),
-        "order": board.order,
+        "sensor": _entry(board.sensor),
+        family: _entry(board.protocol),
     }
-    if board.pressure != "rises":
-        entries["pressure"] = board.pressure
-    entries["port"] = Short(_changed(board.port, "baud"))
-    if board.start != Start():
-        entries["start"] = Short(_changed(board.start))
-    if board.banner:
-        entries["banner"] = Noted(board.banner, "lines")
-    if board.calibration:
-        entries["calibration"] = _calibration_entry(board.calibration)
+    usual = Settings()
+    for key in Settings.__struct_fields__:
+        value = getattr(board, key)
+        if key in ("order", "port") or value != getattr(usual, key):
+            entries[key] = Noted(value, "lines") if key == "banner" else _entry(value)
     return joined(board.name, _TITLE, entries).decode()
 
 
-def _calibration_entry(law: Calibration) -> Entry:
-    points: list[Entry] = [Short([*point]) for point in law.points]
-    entries: dict[str, Entry] = {
-        "unit": law.unit,
-        "points": Short(points, is_run_on=True),
-    }
-    if law.gains:
-        entries["gains"] = Short([*law.gains], is_run_on=True)
-    return entries
-
-
-def _sensor_entry(sensor: Sensor) -> Entry:
-    entries = _changed(sensor, "rows columns full")
-    if not (sensor.baseline or sensor.masked):
-        return Short(entries)
-    if sensor.baseline:
-        entries["baseline"] = Short([*sensor.baseline], is_run_on=True)
-    if sensor.masked:
-        cells: list[Entry] = [Short([*cell]) for cell in sensor.masked]
-        entries["masked"] = Short(cells, is_run_on=True)
-    return entries
-
-
-def _changed(value: Value, always: str = "") -> dict[str, Entry]:
-    """Return the fields that are not as usual, by their keys."""
-    return {
-        one.encode_name: getattr(value, one.name)
+def _entry(value: Any) -> Entry:
+    """Return a part of a board; of a record the fields that are not as usual."""
+    if isinstance(value, tuple):
+        return Short([_entry(one) for one in value], is_run_on=True)
+    if not isinstance(value, Value):
+        found: Entry = value
+        return found
+    always = _ALWAYS.get(type(value), "").split()
+    parts = {
+        one.encode_name: _entry(part)
         for one in structs.fields(value)
-        if getattr(value, one.name) != one.default or one.name in always.split()
+        if (part := getattr(value, one.name)) != one.default or one.name in always
     }
+    has_lists = any(isinstance(part, Short) for part in parts.values())
+    return parts if has_lists else Short(parts)

@@ -4,20 +4,11 @@ Each cell is a fuzzy number over the plane, a pyramid whose top stands on its ce
 and whose base reaches to the centres of the diagonal neighbours: a point dx and dy
 away from the centre, in cells, belongs to it by the degree `1 - max(|dx|, |dy|)`.
 Every point lies in four pyramids, and its value is the mean of the four cells,
-weighted by these degrees (paper, 3.2).
+weighted by these degrees (paper, 3.2, whose printed divisor is a misprint).
 
-The paper prints the divisor as the sum of the pressures, which is a misprint for the
-sum of the degrees: with four cells of 100, 50, 20 and 10, the printed form gives
-100 / 180 = 0.56 at the centre of the first cell, and the other one gives 100.
-
-What is known of a value, with `range` the largest less the smallest of its four cells
-and t the distance to the nearest line through the centres of cells:
-
-- It lies between the smallest and the largest of the four cells.
-- It is continuous, and changes by at most `2 range` a cell's width, right or up.
-- It differs from the bilinear one by at most 0.105 `range`: for a given t the
-  difference is largest on a diagonal, `t(1 - t) - 2t^2 / (1 + 2t)` of the range, and
-  of all t where u = 2t solves u(u + 1)^2 = 1: t = 0.2328, 0.1047 of the range.
+`docs/explanation/interpolation.md` derives what is known of a value: it lies between
+its four cells, changes by at most twice their range a cell's width, and differs from
+the bilinear one by at most 0.105 of it.
 """
 
 from __future__ import annotations

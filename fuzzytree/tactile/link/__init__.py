@@ -40,10 +40,9 @@ __all__ = ["Decoder", "Started", "decoder_of"]
 def decoder_of(board: Board, *, is_joined: bool = False) -> Decoder:
     """Return what finds the frames of a board in its bytes.
 
-    Nothing of it reads, writes or looks at a clock. A decoder is for one stream. That
-    of a board that sent before is joined: it begins anywhere. Its first line of text,
-    or its first bytes up to one that ends a frame, are skipped: cut at their front they
-    could still look whole. Where the banner comes, nothing else is skipped.
+    A decoder is for one stream, without a clock. That of a board that sent before is
+    joined: its first line of text, or its first bytes up to one that ends a frame, are
+    skipped, for they may be cut. Where the banner comes, nothing else is skipped.
 
     Example:
         >>> from fuzzytree.tactile.sensor import Sensor
@@ -123,9 +122,6 @@ def open_connection(
         wait: Whether to wait for a port that went away until it is back.
         most_waiting: How many frames wait for a slow reader before the oldest are
             dropped.
-
-    Returns:
-        The frames as they come. It must be closed: it is a context manager.
 
     Raises:
         PortError: If there is no such port, or it cannot be used.
