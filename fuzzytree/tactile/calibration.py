@@ -79,10 +79,10 @@ class Calibration(Value, FileRecord, frozen=True, dict=True):
 
     def pressures(self, readings: npt.ArrayLike) -> FloatArray:
         """Return the pressures of readings over the baseline, without gains."""
-        x, y = self._curve
+        (x, y), values = self._curve, np.asarray(readings, np.float64)
         slope = (y[-1] - y[-2]) / (x[-1] - x[-2])
-        over = np.maximum(np.asarray(readings, np.float64) - x[-1], 0.0) * slope
-        found: FloatArray = np.interp(readings, x, y) + over
+        over = np.maximum(values - x[-1], 0.0) * slope
+        found: FloatArray = np.interp(values, x, y) + over
         return found
 
     def top(self, full: int) -> float:
@@ -128,10 +128,9 @@ def fit_pressures(
         >>> found.points, found.gains
         (((50.0, 1.0), (80.0, 2.0)), (1.0, 1.0))
     """
-    pairs = _ordered(loads, readings)
-    middles = [float(np.median(cells[cells > 0])) for _, cells in pairs]
-    points = _rising([load for load, _ in pairs], middles, unit)
-    stack = np.array([cells for _, cells in pairs])
+    amounts, stack = _ordered(loads, readings)
+    middles = [float(np.median(cells[cells > 0])) for cells in stack]
+    points = _rising(amounts, middles, unit)
     squares = (stack**2).sum(axis=0)
     products = (stack * np.array(middles)[:, None, None]).sum(axis=0)
     gains = np.where(squares > 0, products / np.where(squares > 0, squares, 1), 1.0)
@@ -149,26 +148,21 @@ def fit_forces(
 
     Args:
         loads: Total forces, above 0.
-        readings: What the cells read over their baseline at each, (rows, columns).
+        readings: As in `fit_pressures`.
         unit: Of the loads.
 
     Raises:
-        TableError: If there is no load, or one reads less than a smaller one.
+        TableError: As `fit_pressures`.
     """
     from scipy.optimize import nnls
 
-    pairs = _ordered(loads, readings)
-    amounts = [load for load, _ in pairs]
-    _rising(amounts, [float(cells.sum()) for _, cells in pairs], unit)
-    largest = max(float(cells.max()) for _, cells in pairs)
-    knots = np.linspace(0.0, largest, len(pairs) + 1)
+    amounts, stack = _ordered(loads, readings)
+    _rising(amounts, stack.sum(axis=(1, 2)).tolist(), unit)
+    knots = np.linspace(0.0, stack.max(), len(stack) + 1)
     width = knots[1]
-    rows = [
-        [np.clip(cells - knot, 0.0, width).sum() for knot in knots[:-1]]
-        for _, cells in pairs
-    ]
+    pieces = [np.clip(stack - knot, 0.0, width).sum(axis=(1, 2)) for knot in knots[:-1]]
     weights = 1.0 / np.array(amounts)  # each load counts by its own size
-    slopes, _ = nnls(np.array(rows) * weights[:, None], np.ones(len(pairs)))
+    slopes, _ = nnls(np.array(pieces).T * weights[:, None], np.ones(len(stack)))
     slopes = np.maximum(slopes, 1e-6 * slopes.max())  # it rises everywhere
     pressures = np.cumsum(slopes * width)
     points = zip(knots[1:].tolist(), pressures.tolist(), strict=True)
@@ -177,7 +171,8 @@ def fit_forces(
 
 def _ordered(
     loads: Sequence[float], readings: Sequence[FloatArray]
-) -> list[tuple[float, FloatArray]]:
+) -> tuple[list[float], FloatArray]:
+    """Return loads from the smallest on, and what the cells read at each."""
     if not loads:
         raise TableError("a calibration needs a load above 0 with its frames")
     order = np.argsort(np.array(loads), kind="stable").tolist()
@@ -186,7 +181,7 @@ def _ordered(
             raise TableError(f"a load is above 0, not {loads[place]:g}")
         if not (readings[place] > 0).any():
             raise TableError(f"at the load {loads[place]:g} no cell reads anything")
-    return [(loads[place], readings[place]) for place in order]
+    return [loads[place] for place in order], np.array([readings[p] for p in order])
 
 
 def _rising(

@@ -108,7 +108,9 @@ def _points(
     around = np.pad(frames.astype(kind), ((0, 0), (1, 1), (1, 1)), "edge")
     corners = sliding_window_view(around, (2, 2), (1, 2))
     degrees, sums = weights(times)
-    values = corners.reshape(-1, 4) @ degrees.reshape(4, -1).astype(kind)
+    values: npt.NDArray[Any] = corners.reshape(-1, 4) @ degrees.reshape(4, -1).astype(
+        kind
+    )
     values /= sums.reshape(-1).astype(kind)
     turned = values.reshape(count, rows + 1, columns + 1, times, times).swapaxes(2, 3)
     dense = turned.reshape(count, (rows + 1) * times, (columns + 1) * times)

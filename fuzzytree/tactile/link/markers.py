@@ -1,19 +1,11 @@
 """Frames that begin with a marker and have a fixed length.
 
-The marker can occur among the cells. So a beginning is believed only where
-
-- a frame stands that its checksum, tail or sizes confirm (two bytes or more of them),
-- or exactly where a frame was expected: behind the last one, or one frame further,
-- or the next frame begins at the right distance too, and no other place within the
-  frame could be its beginning as well. If there are several, as in a picture that does
-  not change, further frames decide; after eight it is the place nearest to where a
-  frame was expected, or the first one at the start of a stream.
-
-Once a frame is found, the next ones are given out at their last byte. If no marker
-stands where the next one must begin, a byte of the last frame may have been lost or
-added, unless two bytes of tail or checksum prove it: the next beginning is looked for
-from its second byte on, for it may lie inside. If that is not a whole number of frames
-further, the last frame is counted as doubtful.
+`docs/reference/boards.md` says where a beginning is believed: the marker can occur
+among the cells. Once a frame is found, the next ones are given out at their last byte.
+If no marker stands where the next one must begin, a byte of the last frame may have
+been lost or added, unless two bytes of tail or checksum prove it: the next beginning is
+looked for from its second byte on, for it may lie inside. If that is not a whole number
+of frames further, the last frame is counted as doubtful.
 """
 
 from __future__ import annotations

@@ -190,10 +190,9 @@ class Recording(_Closing):
         cut_bytes: Bytes at the end that are less than a record.
         started_ns: When the recording began, in nanoseconds since 1970 (UTC); 0 if
             that is not known.
-        label: Shape (frames,): the place of the class in `label_names`; empty if it
-            is not known.
+        label: The place of each frame's class in `label_names`; empty if not known.
         label_names: The names of the classes.
-        subject: Shape (frames,): who was pressing; empty if it is not known.
+        subject: Who was pressing in each frame; empty if not known.
         is_stream: Whether the frames follow each other; times and numbers are made up
             otherwise.
     """
@@ -236,10 +235,10 @@ class Recorder(_Closing):
     (`most_at_risk` is the largest number so far).
 
     Args:
-        path: A file that is not there yet.
+        path: A file that is not there yet, unless `replace` gives up its content.
         board: What sends the frames.
         started_ns: When it began, in nanoseconds since 1970 (UTC); now, if None.
-        replace: Whether the file may be there; its content is lost.
+        replace: Whether the file may be there.
 
     Raises:
         WriteError: If the file is there or cannot be written.
@@ -247,7 +246,6 @@ class Recorder(_Closing):
     Example:
         >>> import tempfile
         >>> from fuzzytree.tactile.boards import Marker
-        >>> from fuzzytree.tactile.sensor import Sensor
         >>> board = Board("mat", Sensor(1, 2), Marker("AA 55"))
         >>> path = Path(tempfile.mkdtemp()) / "a.ftr"
         >>> with Recorder(path, board) as recorder:
@@ -507,8 +505,7 @@ def read_recording(path: PathLike) -> Recording:
     """Return all of a recording; one that is still being written gives what is there.
 
     Raises:
-        ReadError: If it is no recording, or its header is damaged, or it is too large
-            for memory; `RecordingFile` reads it frame by frame.
+        ReadError: As `RecordingFile`, or if it is too large for memory.
     """
     with RecordingFile(path) as file:
         return file.whole()
