@@ -47,7 +47,7 @@ class TextDecoder(Decoder):
         self._banner = self._board.banner
         self._is_endless = False  # inside a line that is longer than any
         self._block: list[list[int]] = []
-        self._held = 0  # bytes of the lines in the block
+        self._held = 0  # bytes of the lines in the block, and of the one looked at
         self._is_waiting = self._is_joined and self._is_block  # for the next block
         self._is_given = False  # the last line ended a frame
 
@@ -65,7 +65,7 @@ class TextDecoder(Decoder):
             frames += self._line(line)
         if len(self._buffer) > self._longest:
             if not self._is_endless:
-                self._line_damaged(0)
+                self._line_damaged()
                 self._is_endless = True
             self._skip(len(self._buffer))
         return frames
@@ -73,46 +73,44 @@ class TextDecoder(Decoder):
     def _take_last(self) -> list[Cells]:
         is_begun = bool(self._block) or self._is_attempt(bytes(self._buffer))
         self.counters.damaged += is_begun and not self._is_waiting
-        self.counters.skipped += self._held
+        self._drop()
         self._is_joined = False
         self._restart()
         return []
 
     def _line(self, line: bytes) -> list[Cells]:
         """Take a line without its line feed; return the frame that it ends."""
-        size = len(line) + 1
+        self._held += len(line) + 1
+        numbers = self._numbers(line)
         if self._is_endless:
             self._is_endless = False
-            self.counters.skipped += size
-            return []
-        numbers = self._numbers(line)
-        if self._is_joined:
+        elif self._is_joined:
             # Its beginning may have gone by; if it is a banner, it has not.
             self._is_joined = False
             self._is_waiting &= numbers is not None or not self._banner
             self._banner = max(0, self._banner - 1) if numbers is None else 0
-            self.counters.skipped += size
-            return []
-        if numbers is None:
-            if self._banner:
-                self._banner -= 1
-                self.counters.skipped += size
-            elif self._is_attempt(line):
-                self._line_damaged(size)
-            else:
-                self._separated(size)
-            return []
-        self._banner = 0
-        if self._is_waiting:
-            self.counters.skipped += size
-            return []
-        if self._is_given and self._is_block:
-            # One line too many: where the last frame began is in doubt.
-            self.counters.doubtful += 1
-            self._wait(size)
-            return []
+        elif numbers is not None:
+            self._banner = 0
+            if self._is_given and self._is_block:  # one line too many
+                self._line_damaged()
+            elif not self._is_waiting:
+                return self._added(numbers)
+        elif self._banner:
+            self._banner -= 1
+        elif self._is_attempt(line):
+            self._line_damaged()
+        else:  # an empty line or a title
+            self.counters.damaged += bool(self._block)
+            if self._is_block and self._is_given:
+                self.framed += self._held
+                self._held = 0
+            self._is_given = self._is_waiting = False
+        self._drop()
+        return []
+
+    def _added(self, numbers: list[int]) -> list[Cells]:
+        """Add the cells of a line to the block; return the frame that it ends."""
         self._block.append(numbers)
-        self._held += size
         if len(self._block) < self._lines:
             return []
         values = np.array(self._block)
@@ -121,37 +119,25 @@ class TextDecoder(Decoder):
         self._is_given = True
         return self._frames(values)
 
-    def _separated(self, size: int) -> None:
-        """Take an empty line or a title."""
-        if self._block:
-            self.counters.damaged += 1
-            self.counters.skipped += self._held
-            self._block, self._held = [], 0
-        if self._is_block and self._is_given:
-            self.framed += size
-        else:
-            self.counters.skipped += size
-        self._is_given = self._is_waiting = False
+    def _line_damaged(self) -> None:
+        """Take a line that was meant to hold cells of a frame, and does not.
 
-    def _line_damaged(self, size: int) -> None:
-        """Take a line that was meant to hold cells, and does not hold them."""
+        In a block the rest of it is skipped; behind a whole one it is in doubt where
+        that began.
+        """
         if not self._is_block:
             self.counters.damaged += 1
-            self.counters.skipped += size
-        elif self._is_waiting:
-            self.counters.skipped += size
-        else:
+        elif not self._is_waiting:
             self.counters.damaged += not self._is_given
             self.counters.doubtful += self._is_given
-            self._wait(size)
+            self.counters.resyncs += 1
+            self._is_given, self._is_waiting = False, True
+        self._drop()
 
-    def _wait(self, size: int) -> None:
-        """Skip what there is of a block, and the rest of it."""
-        self.counters.resyncs += 1
-        self.counters.skipped += self._held + size
+    def _drop(self) -> None:
+        """Skip the lines that wait."""
+        self.counters.skipped += self._held
         self._block, self._held = [], 0
-        self._is_given = False
-        self._is_waiting = True
 
     def _numbers(self, line: bytes) -> list[int] | None:
         """Return the cells of a line, None if it does not hold them."""
