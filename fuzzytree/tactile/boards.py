@@ -242,14 +242,11 @@ def _mistakes(board: Board) -> Iterator[Mistake]:
     if board.calibration and len(board.calibration.gains) not in (0, cells):
         text = f"a calibration has {cells} gains, not {len(board.calibration.gains)}"
         yield ("calibration", "gains"), text
-    if isinstance(protocol, Sentinel):
-        if protocol.end == protocol.zero:
-            text = f"{protocol.end} cannot both end a frame and begin a run"
-            yield ("protocol", "zero"), text
-        if full > 255:
-            text = f"a cell of one byte never reads the sensor's full, {full}"
-            yield ("protocol",), text
-    if isinstance(protocol, Marker | Request) and protocol.bits == 8 and full > 255:
+    if isinstance(protocol, Sentinel) and protocol.end == protocol.zero:
+        text = f"{protocol.end} cannot both end a frame and begin a run"
+        yield ("protocol", "zero"), text
+    is_wide = isinstance(protocol, Text) or getattr(protocol, "bits", 8) == 16
+    if full > 255 and not is_wide:
         text = f"a cell of 8 bits never reads the sensor's full, {full}"
         yield ("protocol", "bits"), text
     if board.port.data_bits == 7 and not isinstance(protocol, Text):

@@ -60,11 +60,8 @@ def interpolated(
 
     Points lie in the middle of equal parts of a cell, and behind the border the
     cells of the border are repeated. For an odd number the middle point of a cell has
-    its value. That, a frame of one value, and frames that are turned or mirrored,
-    hold bit for bit.
-
-    Whole numbers are weighted by whole numbers and divided once: a value is the float
-    nearest to the exact one.
+    its value. Whole numbers are weighted by whole numbers and divided once: a value is
+    the float nearest to the exact one, also in frames that are turned or mirrored.
 
     Args:
         cells: Whole numbers of shape (..., rows, columns).

@@ -109,4 +109,4 @@ def test_a_name_must_fit_into_a_file(name: str, text: str) -> None:
 def test_a_byte_cannot_reach_what_a_sensor_reads_at_most() -> None:
     with pytest.raises(InvalidModelError) as caught:
         Board("b", Sensor(4, 4, full=256), Sentinel())
-    assert str(caught.value) == "a cell of one byte never reads the sensor's full, 256"
+    assert str(caught.value) == "a cell of 8 bits never reads the sensor's full, 256"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import itertools
+import operator
 import os
 import threading
 import time
@@ -432,8 +433,7 @@ def _group_hint(port: str) -> str:
 
 
 def _sum(first: Counters, second: Counters) -> Counters:
-    pairs = zip(astuple(first), astuple(second), strict=True)
-    return Counters(*(one + other for one, other in pairs))
+    return Counters(*map(operator.add, astuple(first), astuple(second)))
 
 
 def _missing() -> MissingExtraError:
