@@ -51,6 +51,7 @@ from fuzzytree.tactile.boards import (
 )
 from fuzzytree.tactile.cli.signals import stop_signal
 from fuzzytree.tactile.link.fixed import layout_of
+from fuzzytree.tactile.presses import open_frames
 from fuzzytree.tactile.recognition.frame_sources import Replayed
 from fuzzytree.tactile.sensor import FRAMES_A_SECOND, Cells, check_frames
 
@@ -692,8 +693,8 @@ def _simulate(board: Board, name: str | None, faults: Faults, link: str | None) 
 
 def _play(path: str, speed: float, faults: Faults, link: str | None) -> None:
     """Send the frames of a recording at their times, after some of its baseline."""
-    source = Replayed(path, speed)
-    board, sensor = source.board, source.board.sensor
+    file = open_frames(path)
+    source, board, sensor = Replayed(file, speed), file.board, file.board.sensor
     rest = empty(board)
     if sensor.baseline:
         rest = np.array(sensor.baseline).reshape(rest.shape)
@@ -706,7 +707,7 @@ def _play(path: str, speed: float, faults: Faults, link: str | None) -> None:
         first=[rest] * board.start.frames,
     )
     # The source first: it ends the wait for the next frame.
-    with device, contextlib.closing(source), stop_signal() as stop:
+    with file, device, contextlib.closing(source), stop_signal() as stop:
         print(device.port, flush=True)
         while not (device.over.wait(_LOOK_S) or stop.is_set()):
             pass

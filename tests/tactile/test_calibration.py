@@ -20,10 +20,10 @@ from fuzzytree.tactile.calibration import (
     fit_pressures,
 )
 from fuzzytree.tactile.link.recording import FrameRecord, Recorder
-from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.rest import Rest
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
+from tests.tactile.replays import replayed
 
 LAW = Calibration("kPa", ((100.0, 10.0), (200.0, 40.0)))
 SHAPE = (6, 5)
@@ -92,7 +92,7 @@ def test_the_unit_reaches_frames_features_and_answers() -> None:
     cells = np.zeros((6, 6), np.int64)
     cells[2:4, 2:4] = 200
     record = FrameRecord(Frame(cells, 0.0, 0), Counters(frames=1))
-    live = Live(tree, Sensor(6, 6), Paced([record], 0.0), "x", calibration=LAW)
+    live = Live(tree, Sensor(6, 6), replayed([record], 0.0), "x", calibration=LAW)
     (answer,) = live.answers()
     (thing,) = answer.objects
     assert answer.sensor.unit == "kPa"
@@ -157,7 +157,7 @@ def test_a_model_of_another_unit_is_refused() -> None:
     tree = ft.learn(rows, target=["a", "a", "b", "b"], name="m", units={"force": "N"})
     for law, unit in ((LAW, "kPa"), (None, "shares of full")):
         with pytest.raises(TableError) as caught:
-            Live(tree, Sensor(6, 6), Paced([], 0.0), "x", calibration=law)
+            Live(tree, Sensor(6, 6), replayed([], 0.0), "x", calibration=law)
         text = f"m: 'force' is in N, and the frames are in {unit}"
         assert str(caught.value) == text
 

@@ -7,7 +7,7 @@ import itertools
 import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from fuzzytree.model import FloatArray, Model
     from fuzzytree.tactile.calibration import Calibration
+    from fuzzytree.tactile.recognition.frame_sources import FrameSource
 
 STATES = {state: state.name.lower() for state in State}
 """The word for each state in lines and JSON."""
@@ -41,37 +42,6 @@ SENTENCES = {
 _KEPT = 1024  # latencies of the median and the 99 %
 _RATED = 64  # frames of the rate
 _SHOWN_S = 3.0  # how long a sentence about a frame that is past stays
-
-
-class FrameSource(Protocol):
-    """Where frames come from: a line or a recording."""
-
-    @property
-    def counters(self) -> Counters:
-        """What came in until now."""
-        ...
-
-    @property
-    def trouble(self) -> str:
-        """A sentence about why no frame comes; empty if frames come."""
-        ...
-
-    @property
-    def sensor(self) -> Sensor | None:
-        """What the cells read at rest, where the source states it anew."""
-        ...
-
-    def __iter__(self) -> Iterator[Frame]:
-        """Give frames as they come."""
-        ...
-
-    def now(self) -> float:
-        """Return the time in seconds, by the clock of the frames' times."""
-        ...
-
-    def close(self) -> None:
-        """Release the source; a reader that waits gets no frame any more."""
-        ...
 
 
 @dataclass(frozen=True)

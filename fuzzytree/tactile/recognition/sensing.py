@@ -14,7 +14,8 @@ from fuzzytree.tactile.board_file import load_board
 from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.link import Connection, open_connection, room, start
 from fuzzytree.tactile.link.recording import Recorder
-from fuzzytree.tactile.recognition import frame_sources as sources
+from fuzzytree.tactile.presses import open_frames
+from fuzzytree.tactile.recognition.frame_sources import Recorded, Replayed
 from fuzzytree.tactile.recognition.live import Live, LiveResult
 from fuzzytree.tactile.recognition.objects import LEAST_AREA
 from fuzzytree.tactile.recognition.recogniser import checked_model, usual_floor
@@ -22,7 +23,7 @@ from fuzzytree.tactile.recognition.recogniser import checked_model, usual_floor
 if TYPE_CHECKING:
     from fuzzytree.files import PathLike
     from fuzzytree.model import Model
-    from fuzzytree.tactile.recognition.live import FrameSource
+    from fuzzytree.tactile.recognition.frame_sources import FrameSource
     from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
 MOST_WAITING: Final = 4
@@ -48,7 +49,7 @@ class TactileSensor(contextlib.AbstractContextManager["TactileSensor"]):
         live: Live,
         board: Board,
         remarks: list[str],
-        recorded: sources.Recorded | None,
+        recorded: Recorded | None,
         closing: contextlib.ExitStack,
     ) -> None:
         self.live, self.board, self.remarks = live, board, remarks
@@ -163,24 +164,24 @@ def open(
         >>> frame.cells.shape, [thing.label for thing in frame.objects]
         ((4, 6), ['bar'])
     """
-    known = _model(model)
+    if not isinstance(model, FuzzyTree | RuleBase):
+        model = checked_model(opened(model), os.fspath(model))
+    is_recorded = record is not None
     with contextlib.ExitStack() as stack:
-        found, used, remarks = _source(source, board, record, speed, say)
-        stack.callback(found.close)
-        recorded: sources.Recorded | None = None
+        found, used, remarks = _source(
+            stack, source, board, speed, say, is_recorded=is_recorded
+        )
+        recorded: Recorded | None = None
         if record is not None:
-            line = found
-            found = recorded = sources.Recorded(found, Recorder(record, used))
-            stack.callback(recorded.end)
-            if isinstance(line, Connection):
-                found = sources.Newest(recorded, MOST_WAITING)
-                stack.callback(found.close)
+            most = MOST_WAITING if isinstance(found, Connection) else 0
+            found = recorded = Recorded(found, Recorder(record, used), most)
+        stack.callback(found.close)
         live = Live(
-            known,
+            model,
             used.sensor,
             found,
             source,
-            reject=usual_floor(known) if reject is None else reject,
+            reject=usual_floor(model) if reject is None else reject,
             follow_s=used.start.follow_s,
             calibration=used.calibration,
             vote_s=vote_s,
@@ -190,38 +191,30 @@ def open(
     raise AssertionError  # an exit stack swallows nothing
 
 
-def _model(model: Model | PathLike) -> Model:
-    if isinstance(model, FuzzyTree | RuleBase):
-        return model
-    return checked_model(opened(model), os.fspath(model))
-
-
 def _source(
+    stack: contextlib.ExitStack,
     source: str,
     board: Board | PathLike | None,
-    record: PathLike | None,
     speed: float,
     say: Callable[[str, str], None] | None,
+    *,
+    is_recorded: bool,
 ) -> tuple[FrameSource, Board, list[str]]:
     """Return where frames come from, the board that they fit, and remarks on it."""
     known = load_board(board) if isinstance(board, str | os.PathLike) else board
     if Path(source).is_file():
-        replayed = sources.Replayed(source, speed, known)
-        return replayed, replayed.board, []
+        file = stack.enter_context(open_frames(source, known))
+        return Replayed(file, speed), file.board, []
     if known is None:
         text = f"{source} is no recording; for a port, name its board"
         raise ValueError(text)
-    most = MOST_WAITING if record is None else room(known)
-    line = open_connection(known, source, most_waiting=most)
-    try:
-        count = known.start.frames
-        if count and say:
-            what = f"the baseline in {count} frames: nothing may lie on the sensor"
-            say("measures", what)
-        began = start(known, _coming(line, say))
-    except BaseException:
-        line.close()
-        raise
+    most = room(known) if is_recorded else MOST_WAITING
+    line = stack.enter_context(open_connection(known, source, most_waiting=most))
+    count = known.start.frames
+    if count and say:
+        what = f"the baseline in {count} frames: nothing may lie on the sensor"
+        say("measures", what)
+    began = start(known, _coming(line, say))
     return line, began.board, began.remarks
 
 

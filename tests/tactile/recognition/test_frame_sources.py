@@ -16,14 +16,11 @@ from fuzzytree.errors import WriteError
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link import Connection, open_connection
 from fuzzytree.tactile.link.recording import FrameRecord, Recorder, read_recording
-from fuzzytree.tactile.recognition.frame_sources import (
-    Newest,
-    Paced,
-    Recorded,
-    Replayed,
-)
+from fuzzytree.tactile.presses import open_frames
+from fuzzytree.tactile.recognition.frame_sources import Recorded, Replayed
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
+from tests.tactile.replays import replayed
 
 BOARD = Board("mat", Sensor(4, 4), Marker("AA 55", checksum="crc16"))
 FRAME = encoded(BOARD, np.arange(16).reshape(4, 4), 0)
@@ -126,13 +123,11 @@ def test_a_recording_keeps_every_frame_however_slow_its_reader_is(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "a.ftr"
-    recorded = Recorded(Paced(records(2000), speed=0.0), Recorder(path, BOARD))
-    newest = Newest(recorded, 4)
+    recorded = Recorded(replayed(records(2000), speed=0.0), Recorder(path, BOARD), 4)
     until(lambda: recorded.written == 2000)
-    newest.close()
-    assert [frame.number for frame in newest] == [1996, 1997, 1998, 1999]
-    assert newest.counters.dropped == 1996
-    recorded.end()
+    recorded.close()
+    assert [frame.number for frame in recorded] == [1996, 1997, 1998, 1999]
+    assert recorded.counters.dropped == 1996
     found = read_recording(path)
     assert found.numbers.tolist() == [*range(2000)]
     assert found.counters.dropped == 0
@@ -149,13 +144,13 @@ def test_a_full_disk_ends_the_recording_and_the_frames_go_on(
         honest(self, frame, counters)
 
     monkeypatch.setattr(Recorder, "write", full)
-    source = Paced(records(9), speed=0.0)
+    source = replayed(records(9), speed=0.0)
     recorded = Recorded(source, Recorder(tmp_path / "a.ftr", BOARD))
     assert [frame.number for frame in recorded] == [*range(9)]
     assert recorded.trouble == (
         "the recording ended: a.ftr: cannot be written: no space left on device"
     )
-    recorded.end()
+    recorded.close()
     assert recorded.written == 3
     assert len(read_recording(tmp_path / "a.ftr").frames) == 3
 
@@ -172,17 +167,16 @@ def test_a_tare_and_a_hot_cell_are_in_the_recording_and_hold_when_it_is_played(
         FrameRecord(Frame(one, 0.1 * k, k), Counters(frames=k + 1))
         for k, one in enumerate(cells)
     )
-    recorded = Recorded(Paced(coming, 0.0), Recorder(path, BOARD))
+    recorded = Recorded(replayed(coming, 0.0), Recorder(path, BOARD))
     live = Live(tree, BOARD.sensor, recorded, "x")
     live.tare()
     for answer in live.answers():
         if answer.events:
             recorded.rest(live.rest.sensor, answer.frame)
-    recorded.end()
-    again = Replayed(path, 0.0)
-    played = Live(tree, again.board.sensor, again, "again")
-    answers = list(played.answers())
-    again.close()
+    recorded.close()
+    with open_frames(path) as file:
+        played = Live(tree, file.board.sensor, Replayed(file, 0.0), "again")
+        answers = list(played.answers())
     assert [one.label for one in answers[:9]] == ["s"] * 9
     assert {one.label for one in answers[10:]} == {""}
     assert played.rest.sensor.masked == ((3, 3),)

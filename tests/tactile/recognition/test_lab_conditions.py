@@ -11,11 +11,11 @@ from press_physics import press
 from press_shapes import OBJECTS
 
 from fuzzytree.tactile.link.recording import FrameRecord
-from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.recogniser import usual_floor
 from fuzzytree.tactile.sensor import Counters, Frame
 from tests.tactile.frame_models import pressed_tree
+from tests.tactile.replays import replayed
 
 Reading = npt.NDArray[np.float64]
 Change = Callable[[Reading, float], Reading]
@@ -54,7 +54,7 @@ def share_right(count: int, change: Change, presses: int = 60) -> float:
     """Return of how many placements most frames are recognised, of 7 times `count`."""
     tree, sensor = pressed_tree(presses), press("circle", 1).sensor
     pairs = [*placements(count, change)]
-    source = Paced((record for record, _ in pairs), 0.0)
+    source = replayed((record for record, _ in pairs), 0.0)
     live = Live(tree, sensor, source, "lab", reject=usual_floor(tree))
     names, right = list(OBJECTS), np.zeros(count * len(OBJECTS))
     for (_, number), answer in zip(pairs, live.answers(), strict=True):

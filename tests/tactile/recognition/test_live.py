@@ -13,10 +13,11 @@ import pytest
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.link.recording import FrameRecord
-from fuzzytree.tactile.recognition.frame_sources import Paced
+from fuzzytree.tactile.recognition.frame_sources import Replayed
 from fuzzytree.tactile.recognition.live import Hold, Live
 from fuzzytree.tactile.recognition.recogniser import State
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
+from tests.tactile.replays import replayed
 
 SENSOR = Sensor(4, 4)
 SMALL = np.eye(4, dtype=np.uint8)
@@ -25,7 +26,7 @@ NOTHING = np.zeros((4, 4), np.uint8)
 AREAS = np.array([[4.0], [5.0], [16.0], [15.0]])
 
 
-def shown(source: Paced, **settings: float) -> Live:
+def shown(source: Replayed, **settings: float) -> Live:
     tree = learn(table(AREAS, columns=["area"]), target=["s", "s", "l", "l"])
     return Live(tree, SENSOR, source, "frames", **settings)  # type: ignore[arg-type] # mypy sees no names
 
@@ -37,7 +38,7 @@ def records(frames: Iterable[Cells], **counters: int) -> Iterator[FrameRecord]:
 
 
 def live(frames: Iterable[Cells], **counters: int) -> Live:
-    return shown(Paced(records(frames, **counters), 0.0))
+    return shown(replayed(records(frames, **counters), 0.0))
 
 
 def test_every_frame_is_answered_and_the_last_one_is_seen() -> None:
@@ -60,7 +61,7 @@ def test_every_frame_is_answered_and_the_last_one_is_seen() -> None:
 
 def test_the_rate_of_all_is_that_of_the_answers() -> None:
     frames = [Frame(SMALL, number / 100, number) for number in (0, 1, 2, 3, 50, 51)]
-    source = Paced([FrameRecord(one, Counters(frames=1)) for one in frames], 0.0)
+    source = replayed([FrameRecord(one, Counters(frames=1)) for one in frames], 0.0)
     found = shown(source)
     assert len(list(found.answers())) == 6
     assert found.view().rate == pytest.approx(5 / 0.51)
@@ -143,7 +144,7 @@ def test_the_largest_latency_is_that_of_all_and_the_median_of_the_last() -> None
 
 
 def test_the_strength_is_that_of_the_class_or_the_largest_one() -> None:
-    found = shown(Paced(records([SMALL, LARGE]), 0.0), reject=1.0)
+    found = shown(replayed(records([SMALL, LARGE]), 0.0), reject=1.0)
     for answer in found.answers():
         own = answer.strengths[answer.code] if answer.label else max(answer.strengths)
         assert answer.strength == own
@@ -164,13 +165,13 @@ def test_nothing_holds_for_less_than_a_frame() -> None:
 
 def test_frames_come_at_the_pace_of_their_times() -> None:
     begun = time.monotonic()
-    times = [frame.time for frame in Paced(records([SMALL] * 6), 2.0)]
+    times = [frame.time for frame in replayed(records([SMALL] * 6), 2.0)]
     assert time.monotonic() - begun >= times[-1] / 2.0
     assert times == [0.0, 0.01, 0.02, 0.03, 0.04, 0.05]
 
 
 def test_a_source_that_is_closed_gives_no_more_frames() -> None:
-    source = Paced(records(itertools.repeat(SMALL)), 0.0)
+    source = replayed(records(itertools.repeat(SMALL)), 0.0)
     frames = iter(source)
     next(frames)
     source.close()
@@ -179,4 +180,4 @@ def test_a_source_that_is_closed_gives_no_more_frames() -> None:
 
 def test_a_speed_below_zero_is_refused() -> None:
     with pytest.raises(ValueError, match=r"^a speed is 0 or more, not -1.0$"):
-        Paced([], -1.0)
+        replayed([], -1.0)

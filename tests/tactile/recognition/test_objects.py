@@ -13,13 +13,13 @@ from press_shapes import OBJECTS
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.link.recording import FrameRecord
-from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.objects import Tracker, regions
 from fuzzytree.tactile.recognition.recogniser import State
 from fuzzytree.tactile.rest import RestEvent
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from tests.tactile.frame_models import pressed_tree
+from tests.tactile.replays import replayed
 
 
 def squares(
@@ -111,7 +111,7 @@ def test_nine_of_ten_objects_are_right_where_two_lie_there() -> None:
         for number, cells in enumerate(frames)
     )
     live = Live(
-        tree, Sensor(16, 32, threshold=6), Paced(records, 0.0), "two", reject=0.001
+        tree, Sensor(16, 32, threshold=6), replayed(records, 0.0), "two", reject=0.001
     )
     right = 0
     for pair, answer in zip(pairs, live.answers(), strict=True):
@@ -125,7 +125,7 @@ def test_each_object_has_its_own_place_and_answer() -> None:
     tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
     cells = squares((1, 1)) + squares((5, 6), size=4)
     record = FrameRecord(Frame(cells, 0.0, 0), Counters(frames=1))
-    (answer,) = Live(tree, Sensor(12, 12), Paced([record], 0.0), "two").answers()
+    (answer,) = Live(tree, Sensor(12, 12), replayed([record], 0.0), "two").answers()
     large, small = answer.objects
     assert (large.label, small.label) == ("l", "s")
     assert (large.x, large.y) == (2.0, -1.0)
@@ -142,7 +142,7 @@ def test_a_vote_is_unknown_before_its_time() -> None:
         FrameRecord(Frame(squares((1, 1)), 0.1 * k, k), Counters(frames=k + 1))
         for k in itertools.count()
     )
-    live = Live(tree, Sensor(12, 12), Paced(records, 0.0), "one", vote_s=0.5)
+    live = Live(tree, Sensor(12, 12), replayed(records, 0.0), "one", vote_s=0.5)
     answers = list(live.answers(9))
     assert [one.label for one in answers] == [""] * 5 + ["s"] * 4
 
@@ -156,7 +156,7 @@ def test_objects_that_touch_are_reported_once() -> None:
         FrameRecord(Frame(cells, 0.1 * k, k), Counters(frames=k + 1))
         for k, cells in enumerate(shown)
     )
-    answers = list(Live(tree, Sensor(12, 12), Paced(records, 0.0), "two").answers())
+    answers = list(Live(tree, Sensor(12, 12), replayed(records, 0.0), "two").answers())
     assert [len(one.objects) for one in answers] == [2, 2, 1, 1, 1, 1]
     events = [(k, event) for k, one in enumerate(answers) for event in one.events]
     assert events == [(2, RestEvent("merged", objects=(1, 2)))]
@@ -175,7 +175,7 @@ def test_a_tare_that_a_pulled_plug_interrupts_begins_anew() -> None:
         )
         for k in range(22)
     )
-    live = Live(tree, Sensor(12, 12), Paced(records, 0.0), "one")
+    live = Live(tree, Sensor(12, 12), replayed(records, 0.0), "one")
     live.tare()
     answers = list(live.answers())
     events = [(k, event.kind) for k, one in enumerate(answers) for event in one.events]

@@ -19,10 +19,10 @@ from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.errors import PortError
 from fuzzytree.tactile.link.recording import FrameRecord
-from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.report.page import MOST_BROWSERS, LivePage
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
+from tests.tactile.replays import replayed
 
 LARGE = np.full((4, 4), 255, np.uint8)
 AREAS = np.array([[4.0], [5.0], [16.0], [15.0]])
@@ -35,7 +35,7 @@ def shown(frames: int | None = None) -> Live:
         FrameRecord(Frame(LARGE, number / 100, number), Counters(frames=number + 1))
         for number in (itertools.count() if frames is None else range(frames))
     )
-    return Live(tree, Sensor(4, 4), Paced(records), "frames")
+    return Live(tree, Sensor(4, 4), replayed(records), "frames")
 
 
 @pytest.fixture
