@@ -87,9 +87,7 @@ def frame_program(sensor: Sensor, names: Sequence[str]) -> FrameProgram:
         ['sum 00', 'sum 10', 'sum 01', 'sum 20', 'sum 02', 'cell r0 c2']
     """
     features = [feature_of(name) for name in names]
-    for feature in features:
-        _check_place(sensor, feature)
-    every = tuple(_every_sum(sensor, features))
+    every = _every_sum(sensor, features)
     make = _Maker(sensor, Centred(Maker()))
     program = _program(make, features, [one.name for one in every])
     sums = tuple(one for one in every if one.name in program.inputs)
@@ -241,18 +239,23 @@ def _weights(sensor: Sensor, p: int, q: int) -> tuple[int, ...]:
 
 
 def _cells_of(sensor: Sensor, feature: Feature) -> tuple[range, range]:
-    """Return the rows and columns of a cell or block."""
-    if feature.kind == "cell":
-        row, column = feature.row, feature.column
-        return range(row, row + 1), range(column, column + 1)
-    return (
-        _part(sensor.rows, feature.row, feature.rows),
-        _part(sensor.columns, feature.column, feature.columns),
+    """Return the rows and columns of a block; a cell is one of the finest division.
+
+    Raises:
+        InvalidModelError: If it lies outside the sensor.
+    """
+    sides = sensor.rows, sensor.columns
+    counts = sides if feature.kind == "cell" else (feature.rows, feature.columns)
+    numbers = feature.row, feature.column
+    parts = [*zip(sides, numbers, counts, strict=True)]
+    if not all(number < count <= side for side, number, count in parts):
+        text = f"{feature.base!r} lies outside a sensor of {sensor.rows} x "
+        raise InvalidModelError([((), f"{text}{sensor.columns} cells")])
+    high, wide = (
+        range(side * number // count, side * (number + 1) // count)
+        for side, number, count in parts
     )
-
-
-def _part(size: int, number: int, count: int) -> range:
-    return range(size * number // count, size * (number + 1) // count)
+    return high, wide
 
 
 def _inside(sensor: Sensor, feature: Feature) -> tuple[int, ...]:
@@ -262,21 +265,6 @@ def _inside(sensor: Sensor, feature: Feature) -> tuple[int, ...]:
         for row in range(sensor.rows)
         for column in range(sensor.columns)
     )
-
-
-def _check_place(sensor: Sensor, feature: Feature) -> None:
-    if feature.kind == "moment":
-        return
-    height = sensor.rows if feature.kind == "cell" else feature.rows
-    width = sensor.columns if feature.kind == "cell" else feature.columns
-    if not (
-        1 <= height <= sensor.rows
-        and 1 <= width <= sensor.columns
-        and feature.row < height
-        and feature.column < width
-    ):
-        text = f"{feature.base!r} lies outside a sensor of {sensor.rows} x "
-        raise InvalidModelError([((), f"{text}{sensor.columns} cells")])
 
 
 def _check_exact(sensor: Sensor, sums: Sequence[Sum]) -> None:

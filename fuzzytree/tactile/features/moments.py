@@ -131,9 +131,6 @@ def _odd(x: Place, signs: list[float]) -> Place:
     return x * total
 
 
-Power = tuple[int, int]
-"""p and q of the moment `sum of g x^p y^q`."""
-
 ORDER = 4
 """The highest order p + q that features need."""
 
@@ -167,15 +164,11 @@ class Centred:
         """Return x and y of the centre, from the cell that the sums are about."""
         return self.near[0] + self.rest[0], self.near[1] + self.rest[1]
 
-    def moment(self, p: int, q: int) -> Noisy:
-        """Return the moment about the centre; that of order 1 is 0."""
-        return self._centred(p, q, p, q)
-
     def complex_moment(self, p: int, q: int) -> Complex:
         """Return C_pq (paper, 2.1)."""
         parts: tuple[list[Noisy], list[Noisy]] = ([], [])
         for power, weight in _expansion(p, q).items():
-            found = self.moment(*power)
+            found = self._centred(*power, *power)
             parts[power[1] % 2].append(found if weight == 1.0 else found * weight)
         nothing = [Noisy(self.make.constant(0.0))]
         return Complex(*(functools.reduce(add, part or nothing) for part in parts))
@@ -225,7 +218,7 @@ def sum_name(p: int, q: int) -> str:
     return f"sum {p}{q}"
 
 
-def _expansion(p: int, q: int) -> Mapping[Power, float]:
+def _expansion(p: int, q: int) -> Mapping[tuple[int, int], float]:
     """Return the weights of x^a y^b in (x + iy)^p (x - iy)^q, those of i left out.
 
     A weight belongs to the real part where b is even, and to the imaginary part where
@@ -235,7 +228,7 @@ def _expansion(p: int, q: int) -> Mapping[Power, float]:
         >>> dict(_expansion(2, 0))
         {(2, 0): 1.0, (1, 1): 2.0, (0, 2): -1.0}
     """
-    weights: dict[Power, float] = {}
+    weights: dict[tuple[int, int], float] = {}
     for j, one in enumerate(_PASCAL[p]):
         for k, two in enumerate(_PASCAL[q]):
             power = (p + q - j - k, j + k)

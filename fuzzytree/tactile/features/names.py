@@ -14,42 +14,6 @@ from fuzzytree.model import Value
 LOG = "log "
 PER_FORCE = " / force"
 
-FEATURES: Mapping[str, str] = MappingProxyType(
-    {
-        "S1": "C11",
-        "S2": "|C20|^2",
-        "S3": "|C30|^2",
-        "S4": "|C21|^2",
-        "S5": "2 Re(conj(C30) C21^3)",
-        "S6": "2 Re(C21^2 conj(C20))",
-        "S7": "|C40|^2",
-        "S8": "|C31|^2",
-        "S9": "C22",
-        "S10": "2 Re(conj(C40) C31^2)",
-        "S11": "2 Re(C31 conj(C20))",
-        "angle": "arg(C20) / 2 in degrees, above -90, up to 90; 0 if C20 is 0",
-        "cos2": "Re C20 / |C20|; 0 if C20 is 0",
-        "sin2": "Im C20 / |C20|; 0 if C20 is 0",
-        "Re C20": "the real part of C20: long along x",
-        "Im C20": "the imaginary part of C20: long along x = y",
-        "Re C21": "the real part of C21",
-        "Im C21": "the imaginary part of C21",
-        "Re C30": "the real part of C30",
-        "Im C30": "the imaginary part of C30",
-        "Re C31": "the real part of C31",
-        "Im C31": "the imaginary part of C31",
-        "Re C40": "the real part of C40",
-        "Im C40": "the imaginary part of C40",
-        "force": "the sum of all cells",
-        "area": "how many cells are pressed",
-        "peak": "the largest cell",
-        "x": "the centre of pressure, in cells to the right of the middle",
-        "y": "the centre of pressure, in cells above the middle",
-    }
-)
-"""What each named feature is. C_pq is the sum of (x + iy)^p (x - iy)^q g over the cells
-with x to the right and y up from the centre of pressure, in cells, and g in [0, 1]."""
-
 INVARIANTS: Mapping[str, tuple[float, tuple[str, ...], str]] = MappingProxyType(
     {
         "S1": (1.0, ("C11",), ""),
@@ -71,10 +35,20 @@ conjugate of another one, if it has one."""
 PAPER: tuple[str, ...] = tuple(INVARIANTS)
 """The paper's features (2.1)."""
 
-ORIENTATION: tuple[str, ...] = ("angle", "Re C30", "Re C21")
-"""Features that distinguish orientations on any sensor."""
+FEATURES: tuple[str, ...] = (
+    *PAPER,
+    *("angle", "cos2", "sin2"),
+    *(
+        f"{part} {name}"
+        for name in ("C20", "C21", "C30", "C31", "C40")
+        for part in ("Re", "Im")
+    ),
+    *("force", "area", "peak", "x", "y"),
+)
+"""Features with a name; `docs/explanation/moments.md` defines each."""
 
-_UNSCALED = frozenset(("angle", "cos2", "sin2", "area", "x", "y"))
+_UNCHANGED = frozenset(("angle", "cos2", "sin2", "x", "y"))  # alike at every pressure
+_UNDIVIDED = _UNCHANGED | {"area", "force"}  # by force
 _PLACE = "(?P<{}>0|[1-9][0-9]{{0,2}})"
 _AT = f"r{_PLACE.format('row')} c{_PLACE.format('column')}"
 _CELL = re.compile(f"cell {_AT}")
@@ -90,7 +64,7 @@ class Feature(Value, frozen=True):
 
     Attributes:
         name: The whole name.
-        base: A key of `FEATURES`; for cells and blocks their part of the name.
+        base: One of `FEATURES`; for cells and blocks their part of the name.
         kind: What the base is.
         row: Of a cell or block, from 0 at the top.
         column: From 0 at the left.
@@ -149,7 +123,7 @@ def feature_of(name: str) -> Feature:
     base = name.removeprefix(LOG).removesuffix(PER_FORCE)
     is_log, per_force = name.startswith(LOG), name.endswith(PER_FORCE)
     cell, block = _CELL.fullmatch(base), _BLOCK.fullmatch(base)
-    if base in FEATURES and not (per_force and base in (*_UNSCALED, "force")):
+    if base in FEATURES and not (per_force and base in _UNDIVIDED):
         return Feature(name, base, is_log=is_log, per_force=per_force)
     match = cell or block
     if match is None:
@@ -174,7 +148,7 @@ def _unknown(name: str, base: str) -> str:
 SETS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "paper": PAPER,
-        "orientation": PAPER + ORIENTATION,
+        "orientation": (*PAPER, "angle", "Re C30", "Re C21"),
         "parts": ("Re C20", "Im C20", "Re C21", "Im C21", "Re C30", "Im C30"),
         "axis": ("cos2", "sin2"),
         "size": ("force", "area", "peak"),
@@ -187,7 +161,6 @@ MOST_FEATURES = 4096
 """The most features of a sentence of sets."""
 
 _DIVISION = re.compile(r"blocks:(\d{1,3})x(\d{1,3})")
-_UNCHANGED = frozenset(("angle", "cos2", "sin2", "x", "y"))  # alike at every pressure
 
 
 def names_of(text: str) -> tuple[str, ...]:
@@ -238,7 +211,5 @@ def _members(part: str) -> Iterator[str]:
     log = LOG if part.startswith(LOG) else ""
     force = PER_FORCE if part.endswith(PER_FORCE) else ""
     for name in members:
-        if name in _UNCHANGED:
-            yield name
-        else:
-            yield f"{log}{name}{'' if name in ('force', 'area') else force}"
+        head = "" if name in _UNCHANGED else log
+        yield f"{head}{name}{'' if name in _UNDIVIDED else force}"

@@ -57,8 +57,9 @@ class FramePlan:
         self.made: FrameProgram = frame_program(sensor, names)
         self._plan: ProgramPlan = plan_program(self.made.program)
         self._run_row = row_runner(self.made.program)
-        weighted = [one.weights for one in self.made.sums if one.of == "cells"]
-        self._weights = np.array(weighted, np.float64).T.copy()
+        size = sensor.rows * sensor.columns
+        weights = [one.weights or (0,) * size for one in self.made.sums]
+        self._weights = np.array(weights, np.float64).T.copy()
 
     def __call__(self, frames: Cells) -> Features:
         """Return the features of frames of shape (frames, rows, columns), or of one.
@@ -83,16 +84,12 @@ class FramePlan:
 
     def _take(self, cells: npt.NDArray[np.int64], sums: FloatArray) -> None:
         """Fill in the sums of some frames; whole numbers below 2^53 add up exactly."""
-        weighted = (cells.astype(np.float64) @ self._weights).T
-        place = 0
+        sums[:] = (cells.astype(np.float64) @ self._weights).T
         for line, one in enumerate(self.made.sums):
             if one.of == "count":
                 sums[line] = np.count_nonzero(cells, axis=1)
             elif one.of == "peak":
                 sums[line] = cells.max(axis=1)
-            else:
-                sums[line] = weighted[place]
-                place += 1
 
 
 def frame_features(sensor: Sensor, frames: Cells, names: Sequence[str]) -> Features:
