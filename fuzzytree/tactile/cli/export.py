@@ -64,6 +64,7 @@ def command(options: TactileExportOptions) -> int:
     from fuzzytree.report import agreement_lines, agreement_verdict
     from fuzzytree.tactile.recognition.checking import check_frames
     from fuzzytree.tactile.recognition.recogniser import Recogniser, State, check_inputs
+    from fuzzytree.tactile.sensor import saturated
 
     form = options.to or Path(options.output).suffix.lower()[1:]
     if form not in _FORMS:
@@ -90,7 +91,7 @@ def command(options: TactileExportOptions) -> int:
             "frames": len(frames),
             "empty": int((seen.states == State.NOTHING).sum()),
             "unknown": int((seen.states == State.UNKNOWN).sum()),
-            "saturated": int((seen.saturated > 0).sum()),
+            "saturated": int((saturated(sensor, frames) > 0).sum()),
         }
         text = ", ".join(f"{count} {name}" for name, count in shown.items())
         lines.append(f"{options.data}: {text}")

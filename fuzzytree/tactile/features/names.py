@@ -38,11 +38,7 @@ PAPER: tuple[str, ...] = tuple(INVARIANTS)
 FEATURES: tuple[str, ...] = (
     *PAPER,
     *("angle", "cos2", "sin2"),
-    *(
-        f"{part} {name}"
-        for name in ("C20", "C21", "C30", "C31", "C40")
-        for part in ("Re", "Im")
-    ),
+    *(f"{part} C{pq}" for pq in (20, 21, 30, 31, 40) for part in ("Re", "Im")),
     *("force", "area", "peak", "x", "y"),
 )
 """Features with a name; `docs/explanation/moments.md` defines each."""

@@ -15,6 +15,7 @@ from fuzzytree.model import (
     FuzzyTree,
     IntArray,
     Model,
+    Outcome,
     RuleBase,
     Run,
 )
@@ -24,7 +25,7 @@ from fuzzytree.tactile.features.names import feature_of, has_unit
 from fuzzytree.tactile.features.plain import State as State
 from fuzzytree.tactile.features.plain import check_reject
 from fuzzytree.tactile.runtimes.frames import Features, FramePlan
-from fuzzytree.tactile.sensor import Cells, Sensor, saturated
+from fuzzytree.tactile.sensor import Cells, Sensor
 
 FEW = 10
 """Rows of a class below which a tree rejects nothing by itself."""
@@ -41,7 +42,6 @@ class Recognition:
         rules: Shape (frames,): the number of the rule or leaf that decides; 0 for none.
         strengths: Shape (classes, frames), in [0, 1]: the strongest rule of each
             class; 0 where nothing presses.
-        saturated: Shape (frames,): how many cells take no more.
         features: The features of the frames.
     """
 
@@ -50,7 +50,6 @@ class Recognition:
     states: IntArray
     rules: IntArray
     strengths: FloatArray
-    saturated: IntArray
     features: Features
 
     def label(self, frame: int = 0) -> str:
@@ -92,8 +91,7 @@ class Recogniser:
     """
 
     def __init__(self, model: Model, sensor: Sensor, reject: float = 0.0) -> None:
-        check_inputs(model)
-        check_units(model, sensor)
+        check_inputs(model, sensor)
         rules = strength_rules(model)
         check_reject(rules, reject)
         self.model, self.sensor, self.reject = model, sensor, reject
@@ -101,17 +99,20 @@ class Recogniser:
         self._place = FramePlan(sensor, ("x", "y", "angle"))
         self._decide: Run = load(model)
         self._fire: Run | None = load(rules) if rules is not model else None
-        number = {label: place for place, label in enumerate(model.classes)}
-        ends = [r.then for r in model.rules] if isinstance(model, RuleBase) else []
+        code = {label: place for place, label in enumerate(model.classes)}
         if isinstance(model, FuzzyTree):
             ends = [leaf.label for leaf in model.leaves]
-        self._class_of = np.array([number[label] for label in ends], np.int64)
-        self._rated = _probable(model)
-        self._rate: Run | None = load(self._rated) if self._rated else None
-        semantics = model.semantics
-        self._uncovered = (
-            -1 if semantics.uncovered is None else number[semantics.uncovered]
-        )
+        else:
+            ends = [rule.then for rule in model.rules]
+        self._class_of = np.array([code[label] for label in ends], np.int64)
+        other = model.semantics.uncovered
+        self._uncovered = -1 if other is None else code[other]
+        self._rated: RuleBase | None = None  # what mixes the model's probabilities
+        if model.semantics.sharpness is not msgspec.UNSET:
+            self._rated = (
+                rules if isinstance(model, RuleBase) else rules_from_tree(model)
+            )
+            self._rate: Run = load(self._rated)
 
     def __call__(self, frames: Cells) -> Recognition:
         """Return what frames show, of shape (frames, rows, columns) or one frame.
@@ -122,9 +123,7 @@ class Recogniser:
         features = self.plan(frames)
         outcome = self._decide(features.values)
         fired = outcome if self._fire is None else self._fire(features.values)
-        strengths = fired.strengths
-        if strengths is None:  # rules that are fired have strengths
-            raise TypeError(f"{self.model.name}: no strengths")
+        strengths = _strengths(fired)
         rules, is_none = outcome.rule, outcome.rule == 0
         codes = np.where(is_none, self._uncovered, self._class_of[rules - 1])
         own = strengths[np.maximum(rules - 1, 0), np.arange(len(rules))]
@@ -142,7 +141,6 @@ class Recogniser:
             states.astype(np.int64),
             np.where(is_object, rules, 0),
             np.where(features.is_pressed, by_class, 0.0),
-            saturated(self.sensor, frames),
             features,
         )
 
@@ -151,12 +149,10 @@ class Recogniser:
 
         Empty where the model has none, and where no rule fires.
         """
-        if self._rated is None or self._rate is None:
+        if self._rated is None:
             return ()
         outcome = self._rate(self.plan(frame).values)
-        if outcome.strengths is None:  # rules that are fired have strengths
-            raise TypeError(f"{self.model.name}: no strengths")
-        found = class_probabilities(self._rated, outcome.strengths, outcome.rule)
+        found = class_probabilities(self._rated, _strengths(outcome), outcome.rule)
         row = [] if found is None else found[:, 0].tolist()
         return () if any(map(math.isnan, row)) else tuple(row)
 
@@ -166,11 +162,9 @@ class Recogniser:
         return x, y, angle
 
 
-def _probable(model: Model) -> RuleBase | None:
-    """Return the rules that mix the probabilities of a model; None without any."""
-    if model.semantics.sharpness is msgspec.UNSET:
-        return None
-    return model if isinstance(model, RuleBase) else rules_from_tree(model)
+def _strengths(outcome: Outcome) -> FloatArray:
+    assert outcome.strengths is not None  # rules that are fired have them
+    return outcome.strengths
 
 
 def usual_floor(model: Model) -> float:
@@ -214,31 +208,24 @@ def strength_rules(model: Model) -> RuleBase:
     return rules_from_tree(model, "raw" if has_sets else "relative")
 
 
-def check_inputs(model: Model) -> None:
-    """Refuse a model with inputs that are no features of a frame.
+def check_inputs(model: Model, sensor: Sensor | None = None) -> None:
+    """Refuse a model with inputs that frames do not have, or not in its units.
 
     Raises:
-        TableError: If one of its inputs is no feature; it names the model.
+        TableError: If an input is no feature, or a pressure in another unit than that
+            of a sensor; it names the model.
     """
+    units = {variable.name: variable.unit for variable in model.variables}
     for name in model.inputs:
         try:
-            feature_of(name)
+            feature = feature_of(name)
         except TableError as error:
             raise TableError(f"{model.name} uses other features: {error}") from error
-
-
-def check_units(model: Model, sensor: Sensor) -> None:
-    """Refuse a model with an input of pressure in another unit than a sensor's.
-
-    Raises:
-        TableError: If there is one; it names the model.
-    """
-    for variable in model.variables:
-        if variable.name not in model.inputs or variable.unit == sensor.unit:
+        if sensor is None or not has_unit(feature) or name not in units:
             continue
-        if has_unit(feature_of(variable.name)):
-            own, other = (u or "shares of full" for u in (variable.unit, sensor.unit))
-            text = f"{variable.name!r} is in {own}, and the frames are in {other}"
+        if units[name] != sensor.unit:
+            own, other = (one or "shares of full" for one in (units[name], sensor.unit))
+            text = f"{name!r} is in {own}, and the frames are in {other}"
             raise TableError(f"{model.name}: {text}")
 
 

@@ -58,12 +58,6 @@ def test_what_no_rule_knows_well_enough_is_unknown() -> None:
     assert known.label() == "large"
 
 
-def test_saturated_cells_are_counted() -> None:
-    frame = np.zeros((8, 8), np.uint8)
-    frame[2:4, 2:5] = 255
-    assert Recogniser(tree(), SENSOR)(frame).saturated.tolist() == [6]
-
-
 def test_raw_rules_answer_with_their_own_strengths() -> None:
     rules = rules_from_tree(tree(), "raw")
     frames = squares(4, 2, 5)
