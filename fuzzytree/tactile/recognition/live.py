@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import threading
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
@@ -284,9 +285,9 @@ class Live:
         self._refused = self.left_out = 0
         self._is_over = False
         self._began = source.now()
-        self._latencies = np.zeros(_KEPT)
-        self._times = np.zeros(_RATED)
-        self._largest = self._first = self._last = 0.0
+        self._latencies: deque[float] = deque(maxlen=_KEPT)
+        self._times: deque[float] = deque(maxlen=_RATED)
+        self._largest = self._first = 0.0
         self._counted = _failures(source.counters)
         self._past: tuple[str, float] = "", -_SHOWN_S
 
@@ -325,20 +326,24 @@ class Live:
 
     def view(self) -> LiveView:
         """Return what there is to see now."""
-        model, sensor = self.recogniser.model, self.rest.bare
-        now, answer = self.source.now(), self._answer
+        model, now, answer = self.recogniser.model, self.source.now(), self._answer
+        with self._news:
+            rate, known = self._rate(), [*self._latencies]
+        latency: Latency | None = None
+        if known:
+            latency = Latency(*np.quantile(known, (0.5, 0.99)).tolist(), self._largest)
         return LiveView(
             self.name,
             model.name,
             model.classes,
-            sensor,
+            self.rest.bare,
             answer,
-            self._rate(),
-            self._latency(),
+            rate,
+            latency,
             asdict(self.source.counters),
             self._refused,
             self._trouble(now),
-            max(now - (answer.frame.time if answer else self._began), 0.0),
+            max(now - (answer.time if answer else self._began), 0.0),
             self._is_over,
         )
 
@@ -376,31 +381,27 @@ class Live:
         frames = np.stack([one.cells for one in found])
         seen = self.recogniser(frames)
         voted = self._tracker(time, found, seen.codes.tolist())
-        objects: list[SensorObject] = []
-        for place, (region, (number, code)) in enumerate(
-            zip(found, voted, strict=True)
-        ):
-            known = -1 if code is None else code  # the vote is not over
-            objects.append(
-                SensorObject(
-                    number,
-                    State.UNKNOWN if known < 0 else State.OBJECT,
-                    known,
-                    "" if known < 0 else seen.classes[known],
-                    tuple(seen.strengths[:, place].tolist()),
-                    region,
-                    self.recogniser,
-                )
+        names = (*seen.classes, "")  # the last one for -1
+        return tuple(
+            SensorObject(
+                number,
+                State.UNKNOWN if code < 0 else State.OBJECT,
+                code,
+                names[code],
+                tuple(strengths),
+                region,
+                self.recogniser,
             )
-        return tuple(objects)
+            for region, (number, code), strengths in zip(
+                found, voted, seen.strengths.T.tolist(), strict=True
+            )
+        )
 
     def _show(self, answer: LiveResult) -> None:
         """Keep a result for the displays, and notify them."""
-        latency, time = answer.latency_s, answer.frame.time
-        self._latencies[self._number % _KEPT] = latency
-        self._times[self._number % _RATED] = self._last = time
+        time = answer.time
         self._first = self._first if self._number else time
-        self._largest = max(self._largest, latency)
+        self._largest = max(self._largest, answer.latency_s)
         counted = _failures(self.source.counters)
         if counted[-1] != self._counted[-1]:  # the port went away
             self.rest.interrupt()
@@ -410,25 +411,20 @@ class Live:
         if answer.events:
             self._past = "; ".join(event.text for event in answer.events), time
         with self._news:
+            self._latencies.append(answer.latency_s)
+            self._times.append(time)
             self._answer = answer
             self._number += 1
             self._news.notify_all()
 
     def _rate(self) -> float:
-        if self._is_over:
-            count, times = self._number, np.array([self._first, self._last])
-        else:
-            times = self._times[: min(self._number, _RATED)]
-            count = len(times)
-        span = float(np.ptp(times)) if count else 0.0
-        return (count - 1) / span if span > 0.0 else 0.0
-
-    def _latency(self) -> Latency | None:
+        """Return the answers a second; call it with the lock of the news."""
         if not self._number:
-            return None
-        known = self._latencies[: min(self._number, _KEPT)]
-        median, most = np.quantile(known, (0.5, 0.99)).tolist()
-        return Latency(median, most, self._largest)
+            return 0.0
+        count = self._number if self._is_over else len(self._times)
+        first = self._first if self._is_over else self._times[0]
+        span = self._times[-1] - first
+        return (count - 1) / span if span > 0.0 else 0.0
 
     def _trouble(self, now: float) -> str:
         past, time = self._past
@@ -459,9 +455,6 @@ def _counted(count: int) -> str:
 class Hold:
     """Detects a change that lasts for some frames, 1 or more.
 
-    Raises:
-        ValueError: If `frames` is below 1.
-
     Example:
         >>> is_new = Hold(2)
         >>> [is_new(value) for value in "aabaabbb"]
@@ -469,11 +462,8 @@ class Hold:
     """
 
     def __init__(self, frames: int) -> None:
-        if frames < 1:
-            raise ValueError(f"something holds for 1 frame or more, not {frames}")
-        self._frames = frames
+        self._frames, self._count = frames, 0
         self._value: object = None
-        self._count = 0
         self._last: object = None
 
     def __call__(self, value: object) -> bool:

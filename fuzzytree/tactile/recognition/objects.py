@@ -29,7 +29,6 @@ HYSTERESIS = 0.6
 
 _TOUCHING = np.ones((3, 3), np.bool_)  # at sides and corners
 _FORGOTTEN_S = 0.5
-_NO_VOTE = -2  # the key of an object that has not been seen for long enough
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,27 +86,15 @@ def regions(
 
 @dataclass(slots=True)
 class _Track:
-    """An object, as it is followed.
-
-    Attributes:
-        number: From 1, in the order in which objects came.
-        row: Of the middle of its box.
-        column: The same.
-        began: When it came.
-        seen: When it was seen last.
-        votes: When it was answered how, within the time of the vote.
-        counts: How often each answer is among these.
-        key: The answer that stands.
-    """
+    """An object, as it is followed."""
 
     number: int
-    row: float
-    column: float
-    began: float
-    seen: float
-    votes: deque[tuple[float, int]] = field(default_factory=deque)
-    counts: Counter[int] = field(default_factory=Counter)
-    key: int = _NO_VOTE
+    began: float  # the time when it came
+    seen: float = 0.0  # the time when it was seen last,
+    middle: tuple[float, float] = (0.0, 0.0)  # and where
+    votes: deque[tuple[float, int]] = field(default_factory=deque)  # times, answers
+    counts: Counter[int] = field(default_factory=Counter)  # of the votes, by answer
+    answer: int | None = None  # the one that stands
 
 
 class Tracker:
@@ -115,7 +102,8 @@ class Tracker:
 
     The region that lies nearest to where an object was is that object, if it is not
     farther than half of its box and two cells. An answer stands once the object has
-    been there for `seconds`; another one replaces it with `HYSTERESIS` of the votes.
+    been there for `seconds`, and is -1 before; another one replaces it with
+    `HYSTERESIS` of the votes.
 
     Args:
         seconds: How long votes count; 0 for the answer to each frame.
@@ -128,7 +116,7 @@ class Tracker:
         >>> tracker, (one,) = Tracker(1.0), regions(np.ones((2, 2), np.int64))[0]
         >>> votes = [(0.0, 5), (0.5, 5), (1.0, 5), (1.2, 3), (1.4, 5)]
         >>> [tracker(time, [one], [code])[0] for time, code in votes]
-        [(1, None), (1, None), (1, 5), (1, 5), (1, 5)]
+        [(1, -1), (1, -1), (1, 5), (1, 5), (1, 5)]
     """
 
     def __init__(self, seconds: float = 0.0) -> None:
@@ -140,8 +128,8 @@ class Tracker:
 
     def __call__(
         self, time: float, found: Sequence[Region], codes: Sequence[int]
-    ) -> list[tuple[int, int | None]]:
-        """Return the number and the answer of each region; None before there is one.
+    ) -> list[tuple[int, int]]:
+        """Return the number and the answer of each region.
 
         Args:
             time: In seconds; it never goes back.
@@ -154,7 +142,7 @@ class Tracker:
             (distance, place, number)
             for place, region in enumerate(found)
             for number, track in enumerate(known)
-            if (distance := _distance(region, track)) <= _reach(region)
+            if (distance := math.dist(_middle(region), track.middle)) <= _reach(region)
         )
         owner: dict[int, _Track] = {}
         taken: set[int] = set()
@@ -162,15 +150,14 @@ class Tracker:
             if place not in owner and number not in taken:
                 owner[place] = known[number]
                 taken.add(number)
-        answers: list[tuple[int, int | None]] = []
+        answers: list[tuple[int, int]] = []
         for place, (region, code) in enumerate(zip(found, codes, strict=True)):
             track = owner.get(place)
             if track is None:
                 self._last += 1
-                track = _Track(self._last, 0.0, 0.0, time, time)
+                track = _Track(self._last, time)
                 known.append(track)
-            track.row, track.column = _middle(region)
-            track.seen = time
+            track.middle, track.seen = _middle(region), time
             answers.append((track.number, self._voted(track, time, code)))
         self._note_merged(found, known, [number for number, _ in answers])
         self._tracks = known
@@ -187,13 +174,13 @@ class Tracker:
                 for one in known
                 if one.number in self._seen
                 and one.number not in numbers
-                and region.cells[round(one.row), round(one.column)] > 0
+                and region.cells[*map(round, one.middle)] > 0
             ]
             if inside:
                 self.merged = (*sorted({number, *inside}),)
         self._seen = set(numbers)
 
-    def _voted(self, track: _Track, time: float, code: int) -> int | None:
+    def _voted(self, track: _Track, time: float, code: int) -> int:
         if not self._seconds:
             return code
         track.votes.append((time, code))
@@ -201,22 +188,16 @@ class Tracker:
         while time - track.votes[0][0] > self._seconds:
             track.counts[track.votes.popleft()[1]] -= 1
         if time - track.began < self._seconds:
-            return None
+            return -1
         leader, count = max(track.counts.items(), key=lambda pair: (pair[1], -pair[0]))
-        is_first = track.key == _NO_VOTE
-        if is_first or count >= HYSTERESIS * len(track.votes):
-            track.key = leader
-        return track.key
+        if track.answer is None or count >= HYSTERESIS * len(track.votes):
+            track.answer = leader
+        return track.answer
 
 
 def _middle(region: Region) -> tuple[float, float]:
     top, left, bottom, right = region.box
     return (top + bottom - 1) / 2, (left + right - 1) / 2
-
-
-def _distance(region: Region, track: _Track) -> float:
-    row, column = _middle(region)
-    return math.hypot(row - track.row, column - track.column)
 
 
 def _reach(region: Region) -> float:

@@ -57,11 +57,7 @@ def runners(
 ) -> tuple[dict[str, Runner], list[str]]:
     """Return the ways that can run here, by name, and a sentence for each other one.
 
-    Args:
-        model: A tree or a rule base whose inputs are names of features.
-        sensor: Whose frames come.
-        reject: As `fuzzytree.tactile.recognition.recogniser.Recogniser`.
-        files: ONNX files to run, by name; one that is written now if there are none.
+    Of the ONNX files there is one that is written now unless some are given.
 
     Raises:
         ReadError: If onnxruntime does not load a file.
@@ -83,12 +79,12 @@ def runners(
 
 def plain_runner(model: Model, sensor: Sensor, reject: float) -> Runner:
     """Return the reference of the others."""
-    made, labels = frame_program(sensor, model.inputs), [*model.classes, ""]
+    made, labels = frame_program(sensor, model.inputs), _labels(model)
 
     def run(frames: Cells) -> Answers:
         shown = [plain_shown(made, model, frame, reject) for frame in frames]
         return {
-            "label": np.array([labels[one.code] for one in shown], np.object_),
+            "label": labels[[one.code for one in shown]],
             "state": np.array([one.state for one in shown], np.int64),
             "rule": np.array([one.rule for one in shown], np.int64),
             "features": np.array([one.features for one in shown], np.float64),

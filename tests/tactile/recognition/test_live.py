@@ -156,13 +156,6 @@ def test_what_flickers_is_not_reported_before_it_holds() -> None:
     assert [is_new(seen) for seen in "aabbb"] == [False] * 5
 
 
-def test_nothing_holds_for_less_than_a_frame() -> None:
-    with pytest.raises(
-        ValueError, match=r"^something holds for 1 frame or more, not 0$"
-    ):
-        Hold(0)
-
-
 def test_frames_come_at_the_pace_of_their_times() -> None:
     begun = time.monotonic()
     times = [frame.time for frame in replayed(records([SMALL] * 6), 2.0)]

@@ -88,7 +88,7 @@ def test_a_vote_needs_more_than_half_to_change() -> None:
         tracker(0.1 * number, found, [code])[0][1]
         for number, code in enumerate(answers)
     ]
-    assert shown[:10] == [None] * 10
+    assert shown[:10] == [-1] * 10
     assert shown[10:31] == [0] * 21
     assert shown[-1] == 1
     assert shown.index(1) > 31
