@@ -23,8 +23,6 @@ from fuzzytree.tactile.features.plain import State, check_reject
 from fuzzytree.tactile.sensor import Sensor, offsets
 
 if TYPE_CHECKING:
-    import onnx
-
     from fuzzytree.exporters import InputBlock, OnnxGraph
 
 Output = Literal["label", "state", "rule", "features", "strengths"]
@@ -82,31 +80,11 @@ def write_frames(
     check_versions(opset, ir)
     check_reject(model, reject)
     require("onnx", "writing onnx needs")
-    made = frame_program(sensor, model.inputs)
-    proto = _model_proto(made, model, outputs, reject, opset, ir, plain=plain)
-    return Written(proto.SerializeToString(deterministic=True))
-
-
-def frames_at_once(sensor: Sensor) -> int:
-    """Return how many frames are best run together, so that they stay in the cache."""
-    return max(_NUMBERS_AT_ONCE // (sensor.rows * sensor.columns), 1)
-
-
-def _model_proto(
-    made: FrameProgram,
-    model: Model,
-    outputs: Sequence[Output],
-    reject: float,
-    opset: int,
-    ir: int,
-    *,
-    plain: bool,
-) -> onnx.ModelProto:
     from onnx import TensorProto
 
     from fuzzytree.exporters import OnnxGraph, model_proto
 
-    sheet, sensor = OnnxGraph(opset), made.sensor
+    made, sheet = frame_program(sensor, model.inputs), OnnxGraph(opset)
     _fill(sheet, made, model, outputs, reject, plain=plain)
     sheet.tensors = sheet.used()
     rules = len(model.rules) if isinstance(model, RuleBase) else 0
@@ -118,27 +96,32 @@ def _model_proto(
         "strengths": (TensorProto.DOUBLE, ["frames", rules]),
     }
     kind = TensorProto.UINT8 if sensor.bits == 8 else TensorProto.UINT16
-    return model_proto(
+    proto = model_proto(
         sheet,
         "frames",
         ("frames", kind, ["frames", sensor.rows, sensor.columns]),
         {name: kinds[name] for name in outputs},
         ir=ir,
-        text=_in_words(made, model),
-        facts=_facts(made, model, outputs, reject),
+        text=_in_words(sensor, model),
+        facts=_facts(sensor, model, outputs, reject),
     )
+    return Written(proto.SerializeToString(deterministic=True))
+
+
+def frames_at_once(sensor: Sensor) -> int:
+    """Return how many frames are best run together, so that they stay in the cache."""
+    return max(_NUMBERS_AT_ONCE // (sensor.rows * sensor.columns), 1)
 
 
 def _facts(
-    made: FrameProgram, model: Model, outputs: Sequence[Output], reject: float
+    sensor: Sensor, model: Model, outputs: Sequence[Output], reject: float
 ) -> dict[str, str]:
     """Return the metadata: plain words where possible, JSON for lists and records."""
     import msgspec
 
-    sensor = made.sensor
     records: dict[str, object] = {
         "sensor": msgspec.to_builtins(sensor),
-        "features": list(made.features),
+        "features": list(model.inputs),
         "classes": list(model.classes),
         "states": [state.name.lower() for state in State],
         "reject": reject,
@@ -148,9 +131,8 @@ def _facts(
     return facts_of(model, "frames", records, model=kind_of(model), dtype="float64")
 
 
-def _in_words(made: FrameProgram, model: Model) -> str:
+def _in_words(sensor: Sensor, model: Model) -> str:
     what = "tree" if isinstance(model, FuzzyTree) else "rule base"
-    sensor = made.sensor
     return (
         f"Frames of {sensor.rows} x {sensor.columns} cells, row 0 at the top, to the "
         f"classes of the fuzzy {what} {model.name!r}: a cell counts where it reads "
@@ -223,16 +205,15 @@ def _sums(sheet: OnnxGraph, made: FrameProgram) -> list[str]:
     if sensor.full != sensor.largest:
         full = sheet.number(float(sensor.full))
         values = sheet.node("Min", values, full, hint="cells")
-    if offsets(sensor):
-        baseline = np.array([offsets(sensor)], np.float64)
-        offset = sheet.constant(baseline, "baseline")
+    taken = offsets(sensor)
+    if taken:
+        offset = sheet.constant(np.array([taken], np.float64), "baseline")
         values = sheet.node("Sub", values, offset, hint="cells")
-    is_pressed = ""
-    counted = any(one.of == "count" for one in made.sums)
-    if offsets(sensor) or sensor.threshold or counted:
+    is_pressed, is_cut = "", bool(taken or sensor.threshold)
+    if is_cut or any(one.of == "count" for one in made.sums):
         threshold = sheet.number(float(sensor.threshold))
         is_pressed = sheet.node("Less", threshold, values, hint="is_cell_pressed")
-    if offsets(sensor) or sensor.threshold:
+    if is_cut:
         zero = sheet.number(0.0)
         values = sheet.node("Where", is_pressed, values, zero, hint="pressures")
     return _taken(sheet, made.sums, values, is_pressed)
@@ -272,8 +253,7 @@ def _is_answer(sheet: OnnxGraph, model: Model, axes: InputBlock) -> str:
     """Return whether the model knows an answer to the features."""
     from fuzzytree.exporters import is_known
 
-    semantics = model.semantics
-    if isinstance(model, RuleBase) and semantics.uncovered is not None:
+    if isinstance(model, RuleBase) and model.semantics.uncovered is not None:
         return is_known(sheet, axes, is_flat=True)
     return sheet.node("Less", sheet.whole(0), "winner", hint="is_answer")
 
