@@ -21,7 +21,7 @@ from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tactile.features import costs
 from fuzzytree.tactile.features.names import feature_of, names_of
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State
-from fuzzytree.tactile.runtimes.frames import Features, frame_features
+from fuzzytree.tactile.runtimes.frames import Features, FramePlan
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -181,7 +181,7 @@ def experiment(
     names = names_of(text)
     tell = progress or _silent
     tell("computing features", 0.0)
-    found = frame_features(task.sensor, task.frames, names)
+    found = FramePlan(task.sensor, names)(task.frames)
     base = task.settings if settings is None else settings
     base = msgspec.structs.replace(base, costs=_costs(task, names))
     learner = _Learner(task, found, base, choose)

@@ -38,7 +38,7 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
-from fuzzytree.tactile.runtimes.frames import FramePlan, frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def compare(
     means: list[FloatArray] = []
     for name in objects:
         found = press(name, count, seed, settings)
-        values = frame_features(found.sensor, found.frames, FEATURES).values
+        values = FramePlan(found.sensor, FEATURES)(found.frames).values
         means.append(values.mean(axis=1))
     paper = np.array(TABLE_2)[:, columns]
     return TableMeans(objects, np.stack(means, axis=1), paper)

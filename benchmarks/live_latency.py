@@ -38,7 +38,7 @@ from fuzzytree.tactile.cli.screen import Screen
 from fuzzytree.tactile.link import open_connection
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.sensing import MOST_WAITING
-from fuzzytree.tactile.runtimes.frames import frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 
 FEATURES = (
     *("S1", "S2", "S7", "S8", "S9", "S11"),
@@ -75,7 +75,7 @@ def paper_tree() -> FuzzyTree:
     labels: list[str] = []
     for name in OBJECTS:
         found = press(name, 50, seed=1)
-        rows.append(frame_features(found.sensor, found.frames, FEATURES).values.T)
+        rows.append(FramePlan(found.sensor, FEATURES)(found.frames).values.T)
         labels += [name] * len(found.frames)
     return learn(table(np.concatenate(rows), columns=FEATURES), target=labels)
 

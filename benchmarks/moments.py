@@ -19,7 +19,7 @@ from exact_features import exact_features
 
 from fuzzytree.tactile.features import costs
 from fuzzytree.tactile.features.names import FEATURES, PAPER
-from fuzzytree.tactile.runtimes.frames import FramePlan, frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def raw_then_binomial(frames: Cells) -> FloatArray:
 
 WAYS: dict[str, Callable[[Cells], FloatArray]] = {
     "raw then binomial": raw_then_binomial,
-    "frames": lambda frames: frame_features(SENSOR, frames, PAPER).values,
+    "frames": lambda frames: FramePlan(SENSOR, PAPER)(frames).values,
 }
 
 

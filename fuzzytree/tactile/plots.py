@@ -13,7 +13,7 @@ import numpy as np
 
 from fuzzytree.report import Markup, Picture, cut, mark, picture, tick_words, ticks
 from fuzzytree.tactile.report.live import PALETTE, shades
-from fuzzytree.tactile.runtimes.frames import frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def draw_frames(sensor: Sensor, frames: Cells, titles: Sequence[str]) -> Picture
     """
     cells = pressed(sensor, frames)
     peak = max(int(cells.max()), 1)
-    found = frame_features(sensor, frames, ["x", "y", "angle"])
+    found = FramePlan(sensor, ["x", "y", "angle"])(frames)
     wide = len(TIMES) * (_PANEL + _GAP) + _BAR
     high = len(cells) * (_HEAD + _PANEL + _GAP)
     names = [f"{sensor.rows} x {sensor.columns} cells"]

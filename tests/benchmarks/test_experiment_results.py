@@ -13,7 +13,7 @@ from experiment_tasks import known_task
 
 from fuzzytree.learning import LearningSettings
 from fuzzytree.tactile.features.names import names_of
-from fuzzytree.tactile.runtimes.frames import frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 
 pytestmark = pytest.mark.heavy
 
@@ -87,7 +87,7 @@ def test_the_learner_of_the_paper_comes_to_the_papers_rate() -> None:
 def test_frames_divided_at_random_would_flatter() -> None:
     pytest.importorskip("sklearn")
     task = known_task("postures-17")
-    values = frame_features(task.sensor, task.frames, names_of("log paper")).values
+    values = FramePlan(task.sensor, names_of("log paper"))(task.frames).values
     place = np.random.default_rng(0).integers(0, 5, len(task.frames))
     known, new = place > 0, place == 0
     given = peer_answers(

@@ -20,7 +20,7 @@ from press_physics import (
 )
 from press_shapes import OBJECTS, FloatArray, Object, rectangle
 
-from fuzzytree.tactile.runtimes.frames import frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 
 EVEN = msgspec.structs.replace(
     PAPER,
@@ -85,7 +85,7 @@ def test_a_bar_that_reads_full_on_an_ideal_sensor_has_the_papers_means() -> None
     width, height = 5.55, 1.735
     bar = Object("bar", (rectangle(width, height),), width * height)  # 1 N a cell
     found = press(bar, 400, 0, ideal)
-    means = frame_features(found.sensor, found.frames, FEATURES).values.mean(axis=1)
+    means = FramePlan(found.sensor, FEATURES)(found.frames).values.mean(axis=1)
     ratios = dict(zip(FEATURES, means / np.array(TABLE_2)[:, 0], strict=True))
     for name in ("S1", "S2", "S7", "S8", "S9", "S10", "S11"):
         assert ratios[name] == pytest.approx(1.0, abs=0.15), name
@@ -99,7 +99,7 @@ def _apart(settings: PhysicsSettings) -> float:
     logs: list[FloatArray] = []
     for name in BARS:
         found = press(name, 200, 2, settings)
-        values = frame_features(found.sensor, found.frames, ["S1 / force"]).values[0]
+        values = FramePlan(found.sensor, ["S1 / force"])(found.frames).values[0]
         logs.append(np.log(values))
     apart = abs(logs[0].mean() - logs[1].mean())
     return float(apart / np.sqrt((logs[0].var() + logs[1].var()) / 2))

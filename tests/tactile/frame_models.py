@@ -16,7 +16,7 @@ from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.tactile.cli.features import USUAL
 from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.names import names_of
-from fuzzytree.tactile.runtimes.frames import frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Sensor
 
 PLAIN = Sensor(16, 16, threshold=4)
@@ -36,7 +36,7 @@ def pressed_tree(count: int, features: str = USUAL, seed: int = 1) -> FuzzyTree:
     """Return a tree on so many simulated presses of each of the paper's objects."""
     frames = np.concatenate([press(name, count, seed).frames for name in OBJECTS])
     names, sensor = names_of(features), press("circle", 1).sensor
-    values = frame_features(sensor, frames, names).values.T
+    values = FramePlan(sensor, names)(frames).values.T
     labels = [name for name in OBJECTS for _ in range(count)]
     return learn(table(values, columns=names), target=labels)
 
@@ -45,7 +45,7 @@ def pressed_tree(count: int, features: str = USUAL, seed: int = 1) -> FuzzyTree:
 def learnt_tree(sensor: Sensor, names: tuple[str, ...], classes: int = 3) -> FuzzyTree:
     """Return a tree on features of made presses, that tells how hard they are."""
     frames = aimed_frames(sensor, 60, seed=3)[-60:]
-    values = frame_features(sensor, frames, names).values
+    values = FramePlan(sensor, names)(frames).values
     force = frames.astype(np.int64).sum(axis=(1, 2))
     ends = np.quantile(force, np.arange(1, classes) / classes)
     target = [f"class {place}" for place in np.digitize(force, ends)]

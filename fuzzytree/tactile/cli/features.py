@@ -185,10 +185,10 @@ def _table(
 ) -> int:
     from fuzzytree.report import counted
     from fuzzytree.tactile.features.names import feature_of, has_unit
-    from fuzzytree.tactile.runtimes.frames import frame_features
+    from fuzzytree.tactile.runtimes.frames import FramePlan
 
     names = [*costs]
-    found = [frame_features(part.sensor, part.frames, names) for part in parts]
+    found = [FramePlan(part.sensor, names)(part.frames) for part in parts]
     content = _csv(parts, found).encode()
     if output == "-":
         answer_bytes(content)

@@ -41,16 +41,17 @@ class Features:
 
 
 class FramePlan:
-    """What computing features of a sensor's frames needs, made once.
+    """Computes features of a sensor's frames; what it needs is made once.
 
     Raises:
-        TableError: As `fuzzytree.tactile.features.frame_program`.
-        InvalidModelError: The same way.
+        TableError: If a name is no feature's.
+        InvalidModelError: As `fuzzytree.tactile.features.frame_program`.
 
     Example:
-        >>> plan = FramePlan(Sensor(2, 2), ["force", "area"])
-        >>> plan(np.array([[[255, 0], [255, 0]]])).values.tolist()
-        [[2.0], [2.0]]
+        >>> bar = np.zeros((1, 5, 5), np.uint8)
+        >>> bar[0, 2, 1:4] = 255
+        >>> FramePlan(Sensor(5, 5), ["S1", "angle"])(bar).values.tolist()
+        [[2.0], [0.0]]
     """
 
     def __init__(self, sensor: Sensor, names: Sequence[str]) -> None:
@@ -90,22 +91,6 @@ class FramePlan:
                 sums[line] = np.count_nonzero(cells, axis=1)
             elif one.of == "peak":
                 sums[line] = cells.max(axis=1)
-
-
-def frame_features(sensor: Sensor, frames: Cells, names: Sequence[str]) -> Features:
-    """Return features of frames, whole numbers of shape (frames, rows, columns).
-
-    Raises:
-        TableError: If a name is no feature's, or the frames do not fit the sensor.
-        InvalidModelError: As `fuzzytree.tactile.features.frame_program`.
-
-    Example:
-        >>> bar = np.zeros((1, 5, 5), np.uint8)
-        >>> bar[0, 2, 1:4] = 255
-        >>> frame_features(Sensor(5, 5), bar, ["S1", "angle"]).values.tolist()
-        [[2.0], [0.0]]
-    """
-    return FramePlan(sensor, names)(frames)
 
 
 def features_of(frames: Cells, names: str, sensor: Sensor | None = None) -> FloatArray:

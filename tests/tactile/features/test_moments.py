@@ -16,7 +16,7 @@ from fuzzytree.semantics.programs.steps import Maker, Program, result_of
 from fuzzytree.tactile.features import frame_program, moments
 from fuzzytree.tactile.features.moments import Centred, Noisy, sum_name
 from fuzzytree.tactile.features.names import FEATURES, PAPER
-from fuzzytree.tactile.runtimes.frames import FramePlan, frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor
 from tests.tactile.frames import hard_frames
 
@@ -96,7 +96,7 @@ def test_a_bound_without_the_error_of_what_is_moved_would_not_hold(
 @pytest.mark.parametrize("sensor", SENSORS, ids=lambda s: f"{s.rows}x{s.columns}")
 def test_features_are_the_exact_ones_but_for_rounding(sensor: Sensor) -> None:
     frames = np.stack([*hard_frames(sensor, 2, 16)])
-    found = frame_features(sensor, frames, list(FEATURES))
+    found = FramePlan(sensor, list(FEATURES))(frames)
     assert np.isfinite(found.values).all()
     for column, frame in enumerate(frames):
         exact = exact_features(sensor, frame, list(FEATURES))
@@ -127,7 +127,7 @@ def test_a_frame_that_a_half_turn_does_not_change_has_no_odd_moments(
     names = ["S3", "S4", "S5", "S6", "Re C21", "Im C21", "Re C30", "Im C30"]
     for frame in hard_frames(sensor, 3, 16):
         turned = np.maximum(frame, frame[::-1, ::-1])
-        assert not frame_features(sensor, turned, names).values.any()
+        assert not FramePlan(sensor, names)(turned).values.any()
 
 
 def test_a_mirror_image_of_itself_has_no_imaginary_parts() -> None:
@@ -135,14 +135,14 @@ def test_a_mirror_image_of_itself_has_no_imaginary_parts() -> None:
     names = ["Im C20", "Im C21", "Im C30", "Im C31", "Im C40"]
     for frame in hard_frames(sensor, 4, 16):
         same = np.maximum(frame, frame[::-1])
-        assert not frame_features(sensor, same, names).values.any()
+        assert not FramePlan(sensor, names)(same).values.any()
 
 
 def test_a_square_has_neither_direction_nor_odd_moments() -> None:
     cells = np.zeros((16, 16), np.uint8)
     cells[3:8, 6:11] = 200
     names = ["S2", "S3", "S4", "S8", "S11", "angle", "cos2", "sin2"]
-    assert not frame_features(Sensor(16, 16), cells, names).values.any()
+    assert not FramePlan(Sensor(16, 16), names)(cells).values.any()
 
 
 def test_moving_a_frame_by_whole_cells_changes_no_bit() -> None:
@@ -152,7 +152,7 @@ def test_moving_a_frame_by_whole_cells_changes_no_bit() -> None:
     wide[0, :, 1:11, 2:11] = small
     wide[1, :, 12:22, 7:16] = small
     names = [name for name in FEATURES if name not in ("x", "y")]
-    one, two = (frame_features(sensor, frames, names).values for frames in wide)
+    one, two = (FramePlan(sensor, names)(frames).values for frames in wide)
     assert one.tobytes() == two.tobytes()
 
 
@@ -160,16 +160,16 @@ def test_a_flip_changes_no_bit_of_an_invariant() -> None:
     sensor = Sensor(11, 14, full=1023)
     frames = np.stack([*hard_frames(sensor, 6, 24)])
     names = [*PAPER, "force", "area", "peak"]
-    wanted = frame_features(sensor, frames, names).values.tobytes()
+    wanted = FramePlan(sensor, names)(frames).values.tobytes()
     for flipped in (frames[:, ::-1], frames[:, :, ::-1], frames[:, ::-1, ::-1]):
-        assert frame_features(sensor, flipped, names).values.tobytes() == wanted
+        assert FramePlan(sensor, names)(flipped).values.tobytes() == wanted
 
 
 def test_a_quarter_turn_changes_invariants_by_rounding_alone() -> None:
     sensor = Sensor(12, 12)
     frames = np.stack([*hard_frames(sensor, 7, 24)])
-    one = frame_features(sensor, frames, PAPER).values
-    two = frame_features(sensor, np.rot90(frames, axes=(1, 2)), PAPER).values
+    one = FramePlan(sensor, PAPER)(frames).values
+    two = FramePlan(sensor, PAPER)(np.rot90(frames, axes=(1, 2))).values
     for name, a, b in zip(PAPER, one, two, strict=True):
         sizes = np.array([_size(name, sensor, frame) for frame in frames])
         assert (abs(a - b) <= 1e-11 * abs(a) + 1e-13 * sizes).all()
@@ -188,7 +188,7 @@ def test_a_turn_that_keeps_to_the_grid_changes_no_exact_invariant() -> None:
         exact = exact_features(sensor, one, PAPER)
         assert exact_features(sensor, two, PAPER) == exact
         wanted = [float(value) for value in exact]
-        found = frame_features(sensor, two, PAPER).values[:, 0]
+        found = FramePlan(sensor, PAPER)(two).values[:, 0]
         assert found == pytest.approx(wanted, rel=1e-11)
 
 
@@ -196,8 +196,8 @@ def test_a_quarter_turn_turns_the_angle() -> None:
     cells = np.zeros((8, 8), np.uint8)
     cells[3, 1:7] = 90
     sensor = Sensor(8, 8)
-    flat = frame_features(sensor, cells, ["angle", "cos2"]).values[:, 0]
-    upright = frame_features(sensor, np.rot90(cells), ["angle", "cos2"]).values[:, 0]
+    flat = FramePlan(sensor, ["angle", "cos2"])(cells).values[:, 0]
+    upright = FramePlan(sensor, ["angle", "cos2"])(np.rot90(cells)).values[:, 0]
     assert flat.tolist() == [0.0, 1.0]
     assert upright.tolist() == [90.0, -1.0]
 
@@ -205,15 +205,15 @@ def test_a_quarter_turn_turns_the_angle() -> None:
 def test_a_diagonal_has_an_angle_of_exactly_45_degrees() -> None:
     rising = np.fliplr(np.eye(6, dtype=np.uint8))
     sensor = Sensor(6, 6, full=1)
-    assert frame_features(sensor, rising, ["angle"]).values.tolist() == [[45.0]]
+    assert FramePlan(sensor, ["angle"])(rising).values.tolist() == [[45.0]]
     falling = np.eye(6, dtype=np.uint8)
-    assert frame_features(sensor, falling, ["angle"]).values.tolist() == [[-45.0]]
+    assert FramePlan(sensor, ["angle"])(falling).values.tolist() == [[-45.0]]
 
 
 def test_where_nothing_presses_every_feature_is_0_and_none_is_missing() -> None:
     sensor = Sensor(4, 4, threshold=3, baseline=(7,) * 16)
     names = [*FEATURES, "log S1", "S10 / force", "cell r1 c1", "block r0 c0 of 2x2"]
-    found = frame_features(sensor, np.full((2, 4, 4), 10), names)
+    found = FramePlan(sensor, names)(np.full((2, 4, 4), 10))
     assert not found.values.any()
     assert not found.is_pressed.any()
 
@@ -263,6 +263,6 @@ def test_blocks_share_all_cells_among_them() -> None:
     sensor = Sensor(7, 5)
     frame = np.arange(35).reshape(7, 5)
     names = [f"block r{r} c{c} of 3x2" for r in range(3) for c in range(2)]
-    means = frame_features(sensor, frame, names).values[:, 0]
+    means = FramePlan(sensor, names)(frame).values[:, 0]
     sizes = [h * w for h in (2, 2, 3) for w in (2, 3)]
     assert means @ sizes == pytest.approx(frame.sum() / 255, rel=1e-15)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.tactile.features.names import PAPER
-from fuzzytree.tactile.runtimes.frames import frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 SENSOR = Sensor(16, 16)
@@ -25,7 +25,7 @@ def frames() -> Cells:
 
 
 def ours() -> Any:
-    return frame_features(SENSOR, frames(), PAPER).values.T
+    return FramePlan(SENSOR, PAPER)(frames()).values.T
 
 
 @pytest.mark.heavy

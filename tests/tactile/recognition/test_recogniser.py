@@ -11,7 +11,7 @@ from fuzzytree.errors import TableError
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State, check_inputs
-from fuzzytree.tactile.runtimes.frames import frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 SENSOR = Sensor(8, 8, threshold=2)
@@ -29,7 +29,7 @@ def squares(count: int, size: int, seed: int) -> Cells:
 
 def tree() -> FuzzyTree:
     frames = np.concatenate([squares(20, 2, 0), squares(20, 5, 1)])
-    values = frame_features(SENSOR, frames, NAMES).values.T
+    values = FramePlan(SENSOR, NAMES)(frames).values.T
     labels = ["small"] * 20 + ["large"] * 20
     return learn(table(values, columns=NAMES), target=labels)
 

@@ -11,7 +11,7 @@ from fuzzytree.errors import TableError
 from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.names import FEATURES
 from fuzzytree.tactile.recognition.runners import as_sent, plain_runner, runners
-from fuzzytree.tactile.runtimes.frames import frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Sensor
 from tests.tactile.frame_models import PLAIN, SMALL, WIDE, learnt_tree, raw_rules
 
@@ -54,7 +54,7 @@ def test_every_feature_is_the_exact_one_but_for_rounding(sensor: Sensor) -> None
     names = [*FEATURES, *(f"log {name}" for name in FEATURES)]
     names += ["S10 / force", "log S5 / force", "cell r1 c1 / force"]
     frames = aimed_frames(sensor, 60, seed=8)
-    values = frame_features(sensor, frames, names).values.T.tolist()
+    values = FramePlan(sensor, names)(frames).values.T.tolist()
     for frame, found in zip(frames, values, strict=True):
         exact = exact_features(sensor, frame, names)
         assert max(errors(sensor, frame, names, found, exact)) < ALLOWED

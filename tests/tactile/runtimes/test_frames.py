@@ -6,7 +6,7 @@ import numpy as np
 
 from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.tactile.features.names import FEATURES, blocks
-from fuzzytree.tactile.runtimes.frames import FramePlan, frame_features
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Sensor
 
 NAMES = [*FEATURES, "log S10 / force", *blocks(3, 2), "cell r2 c4 / force"]
@@ -48,9 +48,9 @@ def test_one_frame_and_many_have_the_same_bits() -> None:
 def test_frames_of_any_whole_type_are_the_same_frames() -> None:
     sensor = Sensor(4, 4)
     frame = np.arange(16).reshape(4, 4)
-    wanted = frame_features(sensor, frame, ["S1", "S3"]).values.tobytes()
+    wanted = FramePlan(sensor, ["S1", "S3"])(frame).values.tobytes()
     for kind in (np.uint8, np.int16, np.uint16, np.int32, np.uint64):
-        found = frame_features(sensor, frame.astype(kind), ["S1", "S3"])
+        found = FramePlan(sensor, ["S1", "S3"])(frame.astype(kind))
         assert found.values.tobytes() == wanted
 
 
