@@ -6,7 +6,9 @@ A baseline that was measured once holds for minutes: sensors warm up, creep and 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -24,9 +26,6 @@ from fuzzytree.tactile.sensor import (
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-    _Followed = tuple[Cells, npt.NDArray[np.float64], npt.NDArray[np.bool_], float]
-    # the cells, their values, which press, seconds since the frame before
 
 FOLLOW_S = 30.0
 """Seconds in which the baseline of a free cell follows 63 % of a change."""
@@ -105,7 +104,6 @@ class Rest:
 
     Attributes:
         bare: The sensor of what is given: neither baseline nor threshold.
-        is_taring: Whether a tare is going on.
 
     Example:
         >>> rest = Rest(Sensor(2, 4, threshold=4, baseline=(9,) * 8))
@@ -146,7 +144,7 @@ class Rest:
     def sensor(self) -> Sensor:
         """The sensor as of now: its baseline in whole numbers, and all masked cells."""
         rests = np.rint(self._baseline).clip(0, self._sensor.full).astype(np.int64)
-        return at_rest(self._sensor, rests, self._is_masked)
+        return at_rest(self._sensor, rests, ~self._is_free)
 
     @property
     def tare_text(self) -> str:
@@ -165,10 +163,9 @@ class Rest:
 
     def restart(self, sensor: Sensor) -> None:
         """Take the baseline and the masked cells of a sensor, as after a tare."""
-        self._waiting: _Followed | None = None
+        self._waiting: Callable[[], None] | None = None
         self._baseline = baseline_of(sensor).astype(np.float64)
-        self._is_masked = is_masked(sensor)
-        self._is_free = ~self._is_masked
+        self._is_free = ~is_masked(sensor)
         self._below = np.zeros(self._baseline.shape, np.int64)
         self._alone_s = np.zeros(self._baseline.shape)
 
@@ -196,10 +193,10 @@ class Rest:
         if self._follow_s:
             values -= self._shift(values)
         found: npt.NDArray[np.int64] = np.rint(values).astype(np.int64)
-        found[(found <= sensor.threshold) | self._is_masked] = 0
+        found[(found <= sensor.threshold) | ~self._is_free] = 0
         before, self._time = self._time, time
         passed_s = 0.0 if before is None else min(max(time - before, 0.0), _LONGEST_S)
-        self._waiting = cells, values, found > 0, passed_s
+        self._waiting = partial(self._follow, cells, values, found > 0, passed_s)
         if self._calibration is not None:
             return self._calibration.steps(found, sensor.full)
         return found
@@ -210,7 +207,7 @@ class Rest:
         So it takes no time of an answer.
         """
         if self._waiting is not None and self._follow_s:
-            self._follow(*self._waiting)
+            self._waiting()
         self._waiting = None
 
     def saturated(self, frame: Cells) -> int:
@@ -272,8 +269,7 @@ class Rest:
     def _mask(self, where: npt.NDArray[np.bool_], kind: Literal["hot", "dead"]) -> None:
         where = where & self._is_free
         if where.any():
-            self._is_masked |= where
-            self._is_free = ~self._is_masked
+            self._is_free = self._is_free & ~where
             self._events.append(RestEvent(kind, places(where)))
 
 

@@ -7,44 +7,14 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, TypeAlias
 
 from fuzzytree.errors import WriteError
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
 if TYPE_CHECKING:
+    from fuzzytree.tactile.link import Connection
     from fuzzytree.tactile.link.recording import FrameFile, Recorder
-
-
-class FrameSource(Protocol):
-    """Where frames come from, in the order of their times."""
-
-    @property
-    def counters(self) -> Counters:
-        """What came in until now."""
-        ...
-
-    @property
-    def trouble(self) -> str:
-        """A sentence about why no frame comes; empty if frames come."""
-        ...
-
-    @property
-    def sensor(self) -> Sensor | None:
-        """What the cells read at rest, where the source states it anew."""
-        ...
-
-    def __iter__(self) -> Iterator[Frame]:
-        """Give frames as they come."""
-        ...
-
-    def now(self) -> float:
-        """Return the time in seconds, by the clock of the frames' times."""
-        ...
-
-    def close(self) -> None:
-        """Release the source; a reader that waits gets no frame any more."""
-        ...
 
 
 class Replayed:
@@ -128,7 +98,9 @@ class Recorded:
         failure: A sentence about why the recording ended; empty if it goes on.
     """
 
-    def __init__(self, source: FrameSource, recorder: Recorder, most: int = 0) -> None:
+    def __init__(
+        self, source: Connection | Replayed, recorder: Recorder, most: int = 0
+    ) -> None:
         self._source, self._recorder = source, recorder
         self.written, self.failure = 0, ""
         self._writing = threading.Lock()  # frames and rests come from two threads
@@ -223,3 +195,7 @@ class Recorded:
             yield frame
         if self._error is not None:
             raise self._error
+
+
+FrameSource: TypeAlias = "Connection | Replayed | Recorded"
+"""Where frames come from, in the order of their times, which `now` goes on with."""

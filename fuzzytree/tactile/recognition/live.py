@@ -7,7 +7,7 @@ import itertools
 import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -288,7 +288,7 @@ class Live:
         self._latencies: deque[float] = deque(maxlen=_KEPT)
         self._times: deque[float] = deque(maxlen=_RATED)
         self._largest = self._first = 0.0
-        self._counted = _failures(source.counters)
+        self._counted = replace(source.counters)
         self._past: tuple[str, float] = "", -_SHOWN_S
 
     def tare(self) -> None:
@@ -331,7 +331,8 @@ class Live:
             rate, known = self._rate(), [*self._latencies]
         latency: Latency | None = None
         if known:
-            latency = Latency(*np.quantile(known, (0.5, 0.99)).tolist(), self._largest)
+            median, most = np.quantile(known, (0.5, 0.99)).tolist()
+            latency = Latency(median, most, self._largest)
         return LiveView(
             self.name,
             model.name,
@@ -402,12 +403,12 @@ class Live:
         time = answer.time
         self._first = self._first if self._number else time
         self._largest = max(self._largest, answer.latency_s)
-        counted = _failures(self.source.counters)
-        if counted[-1] != self._counted[-1]:  # the port went away
+        counted = replace(self.source.counters)
+        if counted.reconnects > self._counted.reconnects:
             self.rest.interrupt()
-        if counted != self._counted:
-            self._past = _sentence(self._counted, counted), time
-            self._counted = counted
+        if text := _failures(self._counted, counted):
+            self._past = text, time
+        self._counted = counted
         if answer.events:
             self._past = "; ".join(event.text for event in answer.events), time
         with self._news:
@@ -433,23 +434,18 @@ class Live:
         return "; ".join(filter(None, sentences))
 
 
-def _failures(counters: Counters) -> tuple[int, ...]:
-    return counters.damaged, counters.dropped, counters.reconnects
-
-
-def _sentence(before: tuple[int, ...], after: tuple[int, ...]) -> str:
+def _failures(before: Counters, after: Counters) -> str:
     """Return what a display says of what went wrong between two frames."""
-    damaged, dropped, back = (b - a for a, b in zip(before, after, strict=True))
-    parts = (
-        f"{_counted(damaged)} damaged and left out" if damaged > 0 else "",
-        f"{_counted(dropped)} dropped, for they came too fast" if dropped > 0 else "",
-        "the port went away and came back" if back > 0 else "",
-    )
-    return "; ".join(filter(None, parts))
-
-
-def _counted(count: int) -> str:
-    return "1 frame was" if count == 1 else f"{count} frames were"
+    parts: list[str] = []
+    for count, what in (
+        (after.damaged - before.damaged, "damaged and left out"),
+        (after.dropped - before.dropped, "dropped, for they came too fast"),
+    ):
+        frames = "1 frame was" if count == 1 else f"{count} frames were"
+        parts += [f"{frames} {what}"] if count > 0 else []
+    if after.reconnects > before.reconnects:
+        parts.append("the port went away and came back")
+    return "; ".join(parts)
 
 
 class Hold:

@@ -23,7 +23,6 @@ from fuzzytree.tactile.recognition.recogniser import checked_model, usual_floor
 if TYPE_CHECKING:
     from fuzzytree.files import PathLike
     from fuzzytree.model import Model
-    from fuzzytree.tactile.recognition.frame_sources import FrameSource
     from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
 MOST_WAITING: Final = 4
@@ -168,18 +167,19 @@ def open(
         model = checked_model(opened(model), os.fspath(model))
     is_recorded = record is not None
     with contextlib.ExitStack() as stack:
-        found, used, remarks = _source(
+        line, used, remarks = _source(
             stack, source, board, speed, say, is_recorded=is_recorded
         )
+        stack.callback(line.close)
         recorded: Recorded | None = None
         if record is not None:
-            most = MOST_WAITING if isinstance(found, Connection) else 0
-            found = recorded = Recorded(found, Recorder(record, used), most)
-        stack.callback(found.close)
+            most = MOST_WAITING if isinstance(line, Connection) else 0
+            recorded = Recorded(line, Recorder(record, used), most)
+            stack.callback(recorded.close)
         live = Live(
             model,
             used.sensor,
-            found,
+            recorded or line,
             source,
             reject=usual_floor(model) if reject is None else reject,
             follow_s=used.start.follow_s,
@@ -199,11 +199,12 @@ def _source(
     say: Callable[[str, str], None] | None,
     *,
     is_recorded: bool,
-) -> tuple[FrameSource, Board, list[str]]:
+) -> tuple[Connection | Replayed, Board, list[str]]:
     """Return where frames come from, the board that they fit, and remarks on it."""
     known = load_board(board) if isinstance(board, str | os.PathLike) else board
     if Path(source).is_file():
-        file = stack.enter_context(open_frames(source, known))
+        file = open_frames(source, known)
+        stack.enter_context(file)
         return Replayed(file, speed), file.board, []
     if known is None:
         text = f"{source} is no recording; for a port, name its board"

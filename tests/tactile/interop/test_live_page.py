@@ -122,7 +122,7 @@ def seen(browser: Any) -> Iterator[Seen]:
     areas = np.array([[3.0], [4.0], [5.0], [15.0], [16.0], [17.0]])
     labels = ["s", "s", "s", EVIL, EVIL, EVIL]
     tree = learn(table(areas, columns=["area"]), target=labels, name="sizes")
-    source = Shown()
+    source: Any = Shown()
     live = Live(tree, Sensor(4, 4), source, "a board", reject=0.05)
     with LivePage(live) as page:
         found = Seen(browser, live, source, page)
@@ -179,7 +179,7 @@ def test_the_page_comes_back_when_live_is_started_anew(seen: Seen) -> None:
     seen.source.put(None)
     seen.until_text("status", "the source is gone: no more frames")
     seen.page.close()
-    source = Shown()
+    source: Any = Shown()
     source.put(NOTHING)
     source.put(None)
     live = Live(seen.live.recogniser.model, Sensor(4, 4), source, "another board")
