@@ -1,7 +1,6 @@
 """What cells read at rest, followed while frames come: tare, drift, hot and dead cells.
 
 A baseline that was measured once holds for minutes: sensors warm up, creep and age.
-`Rest` keeps it from frame to frame, and gives what presses.
 """
 
 from __future__ import annotations

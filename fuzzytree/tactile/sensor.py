@@ -161,9 +161,8 @@ def check_frames(sensor: Sensor, frames: Cells) -> Cells:
     if found.ndim == 2:
         found = found[np.newaxis]
     if found.ndim != 3 or found.shape[1:] != (sensor.rows, sensor.columns):
-        shape = " x ".join(
-            map(str, found.shape[1:] if found.ndim == 3 else found.shape)
-        )
+        sides = found.shape[1:] if found.ndim == 3 else found.shape
+        shape = " x ".join(map(str, sides))
         raise TableError(
             f"a frame of {shape} cells does not fit a sensor of "
             f"{sensor.rows} x {sensor.columns}"
@@ -188,8 +187,7 @@ def pressed(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
     """
     # 64 bits without a sign reach beyond those with one: clip first
     values = np.clip(check_frames(sensor, frames), 0, sensor.full).astype(np.int64)
-    if sensor.baseline:
-        values -= baseline_of(sensor)
+    values -= baseline_of(sensor)
     values[values <= sensor.threshold] = 0
     values[:, is_masked(sensor)] = 0
     return values
@@ -218,9 +216,7 @@ def saturated(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
 def baseline_of(sensor: Sensor) -> npt.NDArray[np.int64]:
     """Return what cells read when nothing presses: shape (rows, columns)."""
     shape = (sensor.rows, sensor.columns)
-    if not sensor.baseline:
-        return np.zeros(shape, np.int64)
-    return np.array(sensor.baseline, np.int64).reshape(shape)
+    return np.array(sensor.baseline or np.zeros(shape), np.int64).reshape(shape)
 
 
 def at_rest(
@@ -228,10 +224,7 @@ def at_rest(
 ) -> Sensor:
     """Return a sensor with another baseline and other masked cells.
 
-    Args:
-        sensor: The sensor.
-        baseline: Of shape (rows, columns), in 0 to `full`.
-        masked: Of shape (rows, columns).
+    Both are of shape (rows, columns), the baseline in 0 to `full`.
 
     Example:
         >>> found = at_rest(Sensor(1, 2), np.array([[3, 0]]), np.array([[False, True]]))

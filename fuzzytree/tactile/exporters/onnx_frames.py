@@ -1,12 +1,9 @@
 """ONNX: one graph from the raw frame to what lies on the sensor.
 
-The cells become exact sums by one product of matrices, the sums become the features
-that the model uses by the steps of their program, and the model's own graph
-decides. Nothing stands in it that the model does not need.
-
-All numbers up to the sums are whole and below 2^53 (`frame_program` refuses a sensor
-for which they are not), and so is each part of a sum. Doubles hold such numbers without
-rounding, so whatever order a library adds in, the sums have the same bits.
+The cells become exact sums by one product of matrices, these become the features by
+the steps of their program, and the model's own graph decides. All numbers up to the
+sums are whole and below 2^53 (`frame_program` refuses other sensors), so in whatever
+order a library adds, the sums have the same bits.
 """
 
 from __future__ import annotations

@@ -12,6 +12,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
+from msgspec import structs
+
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.model import Value
 from fuzzytree.semantics import Maker, Place, Program, Result, result_of
@@ -88,20 +90,28 @@ def frame_program(sensor: Sensor, names: Sequence[str]) -> FrameProgram:
     """
     features = [feature_of(name) for name in names]
     every = _every_sum(sensor, features)
-    make = _Maker(sensor, Centred(Maker()))
-    program = _program(make, features, [one.name for one in every])
-    sums = tuple(one for one in every if one.name in program.inputs)
+    values, results = _Values(sensor), list[Result]()
+    make = values.make
+    is_pressed = make.where(values.moments.is_pressed, 1.0, 0.0)
+    for feature in features:
+        with make.topic(feature.name):
+            results.append(result_of("output", feature.name, values.of(feature)))
+    results.append(result_of("output", PRESSED, is_pressed))
+    inputs = tuple(one.name for one in every)
+    whole = make.program("features", inputs, tuple(results))
+    used = {step.name for step in whole.steps if step.operation == "input"}
+    sums = tuple(one for one in every if one.name in used)
     _check_exact(sensor, sums)
+    program = structs.replace(whole, inputs=tuple(one.name for one in sums))
     return FrameProgram(sensor, tuple(names), sums, program)
 
 
 def costs(sensor: Sensor, names: Sequence[str]) -> Mapping[str, float]:
     """Return how many operations each feature takes by itself.
 
-    Among equally powerful features the paper takes the one that needs the least time
-    (2.3, step 4). In default mode `learn` also divides by its cost what a further
-    feature of a combination gains, and counts of thousands keep nearly all of them
-    out: give it `1 + 1e-6 * cost` where costs decide between equals alone.
+    `learn` divides by its cost what a further feature of a combination gains, and
+    counts of thousands keep nearly all of them out: give it `1 + 1e-6 * cost` where
+    costs decide between equals alone (paper, 2.3, step 4).
 
     Raises:
         TableError: As `frame_program`.
@@ -115,30 +125,15 @@ def costs(sensor: Sensor, names: Sequence[str]) -> Mapping[str, float]:
     return {name: float(frame_program(sensor, [name]).cost) for name in names}
 
 
-def _program(
-    make: _Maker, features: Sequence[Feature], inputs: Sequence[str]
-) -> Program:
-    """Return the program of some features, with those of the inputs that it needs."""
-    pressed = make.make.where(make.moments.is_pressed, 1.0, 0.0)
-    results: list[Result] = []
-    for feature in features:
-        with make.make.topic(feature.name):
-            results.append(result_of("output", feature.name, make.feature(feature)))
-    results.append(result_of("output", PRESSED, pressed))
-    whole = make.make.program("features", tuple(inputs), tuple(results))
-    used = {step.name for step in whole.steps if step.operation == "input"}
-    needed = tuple(name for name in inputs if name in used)
-    return Program(whole.name, needed, whole.steps, whole.results, whole.titles)
+class _Values:
+    """The values of features as steps, with each part made once."""
 
-
-class _Maker:
-    """Makes the steps of features, each part once."""
-
-    def __init__(self, sensor: Sensor, moments: Centred) -> None:
-        self.sensor, self.moments, self.make = sensor, moments, moments.make
+    def __init__(self, sensor: Sensor) -> None:
+        self.sensor, self.make = sensor, Maker()
+        self.moments = Centred(self.make)
         self._parts: dict[str, Complex] = {}
 
-    def feature(self, feature: Feature) -> Place:
+    def of(self, feature: Feature) -> Place:
         """Return the value of a feature, 0 where nothing presses."""
         value = self._value(feature)
         if feature.is_log:

@@ -138,47 +138,35 @@ class Tracker:
         """
         keep_s = max(self._seconds, _FORGOTTEN_S)
         known = [one for one in self._tracks if time - one.seen <= keep_s]
-        pairs = sorted(
+        pairs = sorted(  # the nearest ones first
             (distance, place, number)
             for place, region in enumerate(found)
             for number, track in enumerate(known)
             if (distance := math.dist(_middle(region), track.middle)) <= _reach(region)
         )
-        owner: dict[int, _Track] = {}
-        taken: set[int] = set()
+        owner: dict[int, int] = {}
         for _, place, number in pairs:
-            if place not in owner and number not in taken:
-                owner[place] = known[number]
-                taken.add(number)
+            if place not in owner and number not in owner.values():
+                owner[place] = number
         answers: list[tuple[int, int]] = []
         for place, (region, code) in enumerate(zip(found, codes, strict=True)):
-            track = owner.get(place)
-            if track is None:
+            if place not in owner:
                 self._last += 1
-                track = _Track(self._last, time)
-                known.append(track)
+                owner[place] = len(known)
+                known.append(_Track(self._last, time))
+            track = known[owner[place]]
             track.middle, track.seen = _middle(region), time
             answers.append((track.number, self._voted(track, time, code)))
-        self._note_merged(found, known, [number for number, _ in answers])
-        self._tracks = known
-        return answers
-
-    def _note_merged(
-        self, found: Sequence[Region], known: Sequence[_Track], numbers: list[int]
-    ) -> None:
-        """Note objects of the frame before that lie in the region of another one."""
+        seen = {number for number, _ in answers}
+        gone = [one for one in known if one.number in self._seen - seen]
         self.merged = ()
-        for region, number in zip(found, numbers, strict=True):
-            inside = [
-                one.number
-                for one in known
-                if one.number in self._seen
-                and one.number not in numbers
-                and region.cells[*map(round, one.middle)] > 0
-            ]
+        for region, (number, _) in zip(found, answers, strict=True):
+            places = [(one.number, *map(round, one.middle)) for one in gone]
+            inside = [one for one, *at in places if region.cells[*at] > 0]
             if inside:
                 self.merged = (*sorted({number, *inside}),)
-        self._seen = set(numbers)
+        self._tracks, self._seen = known, seen
+        return answers
 
     def _voted(self, track: _Track, time: float, code: int) -> int:
         if not self._seconds:

@@ -170,11 +170,9 @@ def _strengths(outcome: Outcome) -> FloatArray:
 def usual_floor(model: Model) -> float:
     """Return the floor of strength below which one usually rejects.
 
-    Far from all that a model has learnt every fitted set is 0, and the class that is
-    nearest means nothing. Relative rules have no such strength: their floor is 0. A
-    model that was learnt with groups left out states its own. Any other has the usual
-    one, but a tree that was taught a class with fewer than `FEW` rows has 0: its sets
-    end where these few end, and rejected would be what it knows.
+    It is 0 for relative rules, and for a tree that was taught a class with fewer than
+    `FEW` rows: its sets end where these few end. A model that was learnt with groups
+    left out states its own; any other has the usual one.
 
     Example:
         >>> from fuzzytree import learn, table
