@@ -1,4 +1,4 @@
-"""Frames that are given out as those of a file, whatever their counters are."""
+"""Frames given out as those of a file, whatever their counters, and their classes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 from fuzzytree.tactile.link.recording import FrameRecord
 from fuzzytree.tactile.recognition.frame_sources import Replayed
+from fuzzytree.tactile.recognition.live import LiveResult
 
 
 class Records:
@@ -25,3 +26,8 @@ def replayed(records: Iterable[FrameRecord], speed: float = 1.0) -> Replayed:
     """Return a source of records, at their pace."""
     file: Any = Records(records)
     return Replayed(file, speed)
+
+
+def first_label(answer: LiveResult) -> str:
+    """Return the class of the object of the largest force; empty for none."""
+    return answer.objects[0].label if answer.objects else ""

@@ -164,26 +164,6 @@ class LiveResult:
             return self.objects[0].state
         return None if self.cells is None else State.NOTHING
 
-    @property
-    def code(self) -> int:
-        """The class of the object of the largest force; -1 for none."""
-        return self.objects[0].code if self.objects else -1
-
-    @property
-    def label(self) -> str:
-        """The class of the object of the largest force; empty for none."""
-        return self.objects[0].label if self.objects else ""
-
-    @property
-    def strengths(self) -> tuple[float, ...]:
-        """The strengths of the object of the largest force; empty without one."""
-        return self.objects[0].strengths if self.objects else ()
-
-    @property
-    def strength(self) -> float:
-        """The strength of the object of the largest force; 0 without one."""
-        return self.objects[0].strength if self.objects else 0.0
-
 
 @dataclass(frozen=True, slots=True)
 class Latency:

@@ -281,7 +281,7 @@ def _facts(view: LiveView, lines: int, *, look: Look) -> list[str]:
     bold, end = ("", "") if look == "plain" else (_BOLD, _END)
     found = [f"{bold}{_cut(headline(view), _SIDE - 2)}{end}"]
     answer = view.answer
-    if answer is None or not answer.strengths:
+    if answer is None or not answer.objects:
         return [*found, ""]
     for one in answer.objects[:3]:
         name = f"{one.number} " if len(answer.objects) > 1 else ""
@@ -289,17 +289,18 @@ def _facts(view: LiveView, lines: int, *, look: Look) -> list[str]:
     found.append("")
     room = max(lines - len(found), 0)
     count = room if room >= len(view.classes) else max(room - 1, 0)
+    first = answer.objects[0]
     order = sorted(
-        range(len(answer.strengths)), key=lambda place: -answer.strengths[place]
+        range(len(first.strengths)), key=lambda place: -first.strengths[place]
     )
     places = sorted(order[:count])  # in the order of the classes
     names = [visible(name) for name in view.classes]
     width = min(max(map(cell_len, names)), _NAME)
     for place in places:
         name = set_cell_size(names[place], width)
-        own = answer.strengths[place]
+        own = first.strengths[place]
         bar = _bar(own, _SIDE - 9 - width, look=look)
-        style = bold if place == answer.code else ""
+        style = bold if place == first.code else ""
         found.append(f"{style}{name} {own:4.2f} {bar}{end if style else ''}")
     if len(places) < len(view.classes) and room:
         found.append(f"and {len(view.classes) - len(places)} weaker ones")

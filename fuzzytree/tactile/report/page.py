@@ -277,12 +277,13 @@ def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object
     """
     answer = view.answer
     state = answer.state if answer else None
+    first = answer.objects[0] if answer and answer.objects else None
     facts: dict[str, object] = {
         "state": "waiting" if state is None else STATES[state],
         "headline": headline(view),
         "sentence": _sentence(answer),
-        "code": answer.code if answer else -1,
-        "strengths": answer.strengths if answer else (),
+        "code": first.code if first else -1,
+        "strengths": first.strengths if first else (),
         "facts": [*_numbers(view)],
         "status": status(dataclasses.replace(view, is_over=is_over)),
         "over": is_over,
@@ -312,8 +313,9 @@ def _sentence(answer: LiveResult | None) -> str:
     if len(answer.objects) > 1:
         return f"{len(answer.objects)} objects; the strengths are the first one's"
     if answer.objects and answer.state is State.OBJECT:
-        where = whereabouts(answer.objects[0])
-        return f"{SENTENCES[answer.state]}, strength {answer.strength:.2f}; {where}"
+        (one,) = answer.objects
+        where = whereabouts(one)
+        return f"{SENTENCES[one.state]}, strength {one.strength:.2f}; {where}"
     return "the sensor is free" if answer.state is State.NOTHING else "rejected"
 
 

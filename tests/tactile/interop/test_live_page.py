@@ -19,6 +19,7 @@ from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.recognition.live import Live, LiveResult
 from fuzzytree.tactile.report.page import LivePage
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
+from tests.tactile.replays import first_label
 
 pytestmark = pytest.mark.heavy
 
@@ -78,7 +79,7 @@ class Seen:
         assert self.live.wait(count, PATIENCE_S) == count + 1
         answer = self.live.view().answer
         assert answer is not None
-        return answer.label
+        return first_label(answer)
 
     def text(self, name: str) -> str:
         return str(self.browser.find_element("id", name).text)

@@ -15,7 +15,7 @@ from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.recogniser import usual_floor
 from fuzzytree.tactile.sensor import Counters, Frame
 from tests.tactile.frame_models import pressed_tree
-from tests.tactile.replays import replayed
+from tests.tactile.replays import first_label, replayed
 
 Reading = npt.NDArray[np.float64]
 Change = Callable[[Reading, float], Reading]
@@ -59,7 +59,7 @@ def share_right(count: int, change: Change, presses: int = 60) -> float:
     names, right = list(OBJECTS), np.zeros(count * len(OBJECTS))
     for (_, number), answer in zip(pairs, live.answers(), strict=True):
         if number >= 0:
-            right[number] += answer.label == names[number % len(names)]
+            right[number] += first_label(answer) == names[number % len(names)]
     return float(np.mean(right > (STAY + 2) / 2))
 
 
