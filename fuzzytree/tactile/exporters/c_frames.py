@@ -300,12 +300,8 @@ def _part_table(sensor: Sensor, parts: Sequence[Sum]) -> Iterator[str]:
 def _part_loop(count: int, first: int, kind: str) -> Iterator[str]:
     yield f"    for (place = 0; place < {count}u; place++) {{\n"
     yield f"        {kind} total = 0;\n"
-    for line, side in ((0, "row"), (2, "column")):
-        start, end = (
-            f"name_patch[4 * place + {line}]",
-            f"name_patch[4 * place + {line + 1}]",
-        )
-        indent = "        " if side == "row" else "            "
+    for line, side, indent in ((0, "row", " " * 8), (2, "column", " " * 12)):
+        start, end = (f"name_patch[4 * place + {one}]" for one in (line, line + 1))
         yield f"{indent}for ({side} = {start}; {side} <= {end}; {side}++)\n"
     yield "                total += name_pressed(frame, row * NAME_COLUMNS + column);\n"
     yield f"        sum[{first} + place] = (name_real)total;\n    }}\n"
