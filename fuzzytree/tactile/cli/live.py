@@ -136,7 +136,7 @@ def command(options: TactileLiveOptions) -> int:
             say_rows(("serves", url, ""), quiet=options.quiet)
         try:
             with _display(live, options) as write:
-                for answer in sensor.answers(options.frames):
+                for answer in live.answers(options.frames):
                     write(answer)
                     labels.update(_words(answer))
                     frames += 1

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.errors import TableError
+from fuzzytree.tactile.recognition.frame_sources import FrameSource, Recorded
 from fuzzytree.tactile.recognition.objects import (
     LEAST_AREA,
     Region,
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
     from fuzzytree.model import FloatArray, Model
     from fuzzytree.tactile.calibration import Calibration
-    from fuzzytree.tactile.recognition.frame_sources import FrameSource
 
 STATES = {state: state.name.lower() for state in State}
 """The word for each state in lines and JSON."""
@@ -42,6 +42,7 @@ SENTENCES = {
 
 _KEPT = 1024  # latencies of the median and the 99 %
 _RATED = 64  # frames of the rate
+_RECORDED = frozenset(("tare", "hot", "dead"))  # kinds of events
 _SHOWN_S = 3.0  # how long a sentence about a frame that is past stays
 
 
@@ -276,7 +277,13 @@ class Live:
         self._tare_wanted.set()
 
     def answers(self, most: int | None = None) -> Iterator[LiveResult]:
-        """Give an answer for each frame, `most` of them, or until there are no more."""
+        """Give an answer for each frame, `most` of them, or until there are no more.
+
+        What changes in what the cells read at rest goes to a recording of the source.
+
+        Raises:
+            PortError: As the source.
+        """
         try:
             for frame in itertools.islice(self.source, most):
                 if self.source.sensor is not self._stated:
@@ -286,6 +293,9 @@ class Live:
                     self._tare_wanted.clear()
                     self.rest.tare()
                 answer = self._answered(frame)
+                kinds = {event.kind for event in answer.events}
+                if kinds & _RECORDED and isinstance(self.source, Recorded):
+                    self.source.rest(self.rest.sensor, frame)
                 yield answer
                 self._show(answer)
                 self.rest.follow()

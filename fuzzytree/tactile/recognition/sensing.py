@@ -52,8 +52,7 @@ class TactileSensor(contextlib.AbstractContextManager["TactileSensor"]):
         closing: contextlib.ExitStack,
     ) -> None:
         self.live, self.board, self.remarks = live, board, remarks
-        self.recorded = recorded
-        self._closing = closing
+        self.recorded, self._closing = recorded, closing
 
     def __iter__(self) -> Iterator[LiveResult]:
         """Give what each frame shows, until no more come.
@@ -61,18 +60,7 @@ class TactileSensor(contextlib.AbstractContextManager["TactileSensor"]):
         Raises:
             PortError: If the port cannot be used any more.
         """
-        return self.answers()
-
-    def answers(self, most: int | None = None) -> Iterator[LiveResult]:
-        """Give what each frame shows, of `most` frames.
-
-        What changes in what the cells read at rest goes to the recording.
-        """
-        for answer in self.live.answers(most):
-            is_new = any(one.kind in ("tare", "hot", "dead") for one in answer.events)
-            if is_new and self.recorded is not None:
-                self.recorded.rest(self.sensor, answer.frame)
-            yield answer
+        return self.live.answers()
 
     @property
     def classes(self) -> tuple[str, ...]:

@@ -170,9 +170,7 @@ def test_a_tare_and_a_hot_cell_are_in_the_recording_and_hold_when_it_is_played(
     recorded = Recorded(replayed(coming, 0.0), Recorder(path, BOARD))
     live = Live(tree, BOARD.sensor, recorded, "x")
     live.tare()
-    for answer in live.answers():
-        if answer.events:
-            recorded.rest(live.rest.sensor, answer.frame)
+    assert len(list(live.answers())) == 60
     recorded.close()
     with open_frames(path) as file:
         played = Live(tree, file.board.sensor, Replayed(file, 0.0), "again")
