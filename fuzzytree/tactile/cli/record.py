@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import shlex
-import sys
 import threading
-import time
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import click
 
@@ -20,6 +19,7 @@ from fuzzytree.cli import (
     argument,
     flag,
     option,
+    progress_bar,
     say,
     say_rows,
     takes,
@@ -29,14 +29,10 @@ from fuzzytree.files import check_place
 from fuzzytree.tactile.cli.signals import stop_signal
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.link import Connection, Started
-    from fuzzytree.tactile.link.recording import Recorder
+    from fuzzytree.tactile.link import Connection
     from fuzzytree.tactile.sensor import Frame
 
-End = Literal["frames", "seconds", "told", "port"]
-"""Enough frames, or seconds; Ctrl-C and its like; or the port went away."""
-
-_LOOK_S = 0.1
+_LOOK_S = 0.1  # how often a signal and the time are looked at while no frame comes
 
 
 class TactileRecordOptions(ResultOptions):
@@ -63,173 +59,115 @@ def command(options: TactileRecordOptions) -> int:
     The first frames measure the baseline: leave the sensor empty. The recording waits
     for a port that goes away. Exit 1 if the port does not come back.
     """
+    from fuzzytree.report import counted
     from fuzzytree.tactile.board_file import load_board
     from fuzzytree.tactile.link import open_connection, room, start
     from fuzzytree.tactile.link.recording import Recorder
 
     if options.output == "-":
         raise click.UsageError("a recording is a file, and not standard output")
-    known = load_board(options.board)
+    known, quiet = load_board(options.board), options.quiet
     check_place(options.output)
     if Path(options.output).exists() and not options.force:
         raise WriteError(f"{options.output}: is there already; --force replaces it")
+    count, first, last = 0, 0.0, 0.0
     with (
         stop_signal() as stop,
         open_connection(
             known, options.port, wait=not options.no_wait, most_waiting=room(known)
         ) as line,
+        progress_bar(quiet=quiet) as show,
     ):
-        coming = _Coming(line, stop, options)
-        say_rows(
-            ("opened", options.port, f"{known.name}, {known.port.baud} baud"),
-            quiet=options.quiet,
-        )
+        opened = f"{known.name}, {known.port.baud} baud"
+        say_rows(("opened", options.port, opened), quiet=quiet)
         try:
-            started = start(known, coming.frames())
+            board, remarks = start(known, _frames(line, stop, options))
         except PortError:
             if not stop.is_set():
                 raise
             say("ended before the baseline was measured; nothing was written")
             return 0
-        _tell_start(started, quiet=options.quiet)
-        with Recorder(options.output, started.board, replace=options.force) as recorder:
-            end = coming.record(recorder)
-    _tell(options, line, recorder, coming)
+        rest = board.sensor.baseline
+        text = f"baseline {min(rest)} to {max(rest)}" if rest else "baseline none"
+        measured = f"from {counted(board.start.frames, 'frame')}"
+        say_rows(("measured", text, measured), quiet=quiet)
+        for remark in remarks:
+            say(f"remark   {remark}", quiet=quiet)
+        with Recorder(options.output, board, replace=options.force) as recorder:
+            frames = _frames(line, stop, options)
+            for frame in itertools.islice(frames, options.frames):
+                first = first if count else frame.time
+                if options.seconds and frame.time - first >= options.seconds:
+                    break
+                counters = line.counters
+                recorder.write(frame, counters)
+                count, last = count + 1, frame.time
+                wrong = f"{counters.damaged} damaged, {counters.dropped} dropped"
+                show(f"{last - first:.0f} s, {count} frames, {wrong}", None)
+        if count == options.frames:
+            end = "frames"
+        elif stop.is_set():
+            end = "told"
+        else:
+            end = "port" if line.state == "ended" else "seconds"
+    seconds, facts = last - first, asdict(line.counters)
+    rate = f", {(count - 1) / seconds:.1f} a second" if seconds else ""
+    risk = counted(recorder.most_at_risk, "frame")
+    say_rows(
+        ("wrote", options.output, f"{counted(count, 'frame')}, {seconds:.1f} s{rate}"),
+        ("counted", ", ".join(f"{name} {n}" for name, n in facts.items()), ""),
+        ("at risk", f"{risk} at most, if the power had failed", ""),
+        ("next", shlex.join(["fuzzytree", "tactile", "replay", options.output]), ""),
+        quiet=quiet,
+    )
     if options.as_json:
-        facts: dict[str, object] = {
-            "file": options.output,
-            "board": started.board.name,
-            "masked": started.board.sensor.masked,
-            "remarks": started.remarks,
-            "frames": coming.count,
-            "seconds": coming.seconds,
-            "end": end,
-            "counters": asdict(line.counters),
-            "most_at_risk": recorder.most_at_risk,
-        }
-        answer_json(facts)
+        answer_json(
+            {
+                "file": options.output,
+                "board": board.name,
+                "masked": board.sensor.masked,
+                "remarks": remarks,
+                "frames": count,
+                "seconds": seconds,
+                "end": end,
+                "counters": facts,
+                "most_at_risk": recorder.most_at_risk,
+            }
+        )
     return 1 if end == "port" else 0
 
 
-class _Coming:
-    """The frames of a line, with a word on whatever happens to it.
+def _frames(
+    line: Connection, stop: threading.Event, options: TactileRecordOptions
+) -> Iterator[Frame]:
+    """Give frames until the line ends, no frame comes in time, or a signal comes.
 
-    Attributes:
-        count: How many were written.
-        seconds: From the first to the last of these.
+    Say what happens to the line. After a signal, what came before it is given.
+
+    Raises:
+        PortError: If bytes come that are no frames, before the first frame.
     """
-
-    def __init__(
-        self, line: Connection, stop: threading.Event, options: TactileRecordOptions
-    ) -> None:
-        self.count, self.seconds = 0, 0.0
-        self._line, self._stop, self._options = line, stop, options
-        self._trouble, self._reconnects = "", 0
-        self._first_s = 0.0
-        self._begun = self._said = time.monotonic()
-
-    def record(self, recorder: Recorder) -> End:
-        """Write frames until it is enough; return why it ended."""
-        self._begun = self._said = time.monotonic()
-        limit_s, most = self._options.seconds, self._options.frames
-        for frame in self.frames():
-            if self.count and limit_s and frame.time - self._first_s >= limit_s:
-                return "seconds"
-            if self._written(frame, recorder) == most:
-                return "frames"
-        if self._line.state == "ended":
-            return "port"
-        if not self._stop.is_set():
-            return "seconds"
-        self._line.close()  # what came before is kept
-        with contextlib.suppress(PortError):  # whatever it is, it comes too late
-            for frame in self._line:
-                if self._written(frame, recorder) == most:
-                    break
-        return "told"
-
-    def _written(self, frame: Frame, recorder: Recorder) -> int:
-        """Write a frame; return how many there are."""
-        recorder.write(frame, self._line.counters)
-        if not self.count:
-            self._first_s = frame.time
-        self.seconds = frame.time - self._first_s
-        self.count += 1
-        return self.count
-
-    def frames(self) -> Iterator[Frame]:
-        """Yield frames until a signal, the time limit or the end of the connection.
-
-        Raises:
-            PortError: If bytes come that are no frames, before the first frame.
-        """
-        limit_s = self._options.seconds
-        while not self._stop.is_set():
-            frame = None
-            try:
-                frame = self._line.take(_LOOK_S)
-            except PortError as error:
-                if self._line.state != "ended" and not self._line.counters.frames:
-                    raise
-                say(str(error))
-            self._tell()
-            if frame is not None:
-                yield frame
-                continue
-            is_late = limit_s and time.monotonic() - self._begun >= limit_s
-            if is_late or self._line.state == "ended":
-                return
-
-    def _tell(self) -> None:
-        """Say when the line changes, and each second, on a terminal, how far it is."""
-        trouble, quiet = self._line.trouble, self._options.quiet
-        counters, port = self._line.counters, self._line.port
-        if counters.reconnects != self._reconnects:
-            self._reconnects, self._trouble = counters.reconnects, trouble
-            say(f"{port}: went away, and is back", quiet=quiet)
-        elif trouble != self._trouble and self._line.state != "ended":
-            self._trouble = trouble
-            say(trouble or f"{port}: frames come again", quiet=quiet)
-        now = time.monotonic()
-        if now - self._said >= 1 and self.count:
-            self._said = now
-            if sys.stderr.isatty():
-                text = f"{now - self._begun:.0f} s, {self.count} frames"
-                wrong = f"{counters.damaged} damaged, {counters.dropped} dropped"
-                say(f"{text}, {wrong}", quiet=quiet)
-
-
-def _tell_start(started: Started, *, quiet: bool) -> None:
-    from fuzzytree.report import counted
-
-    board = started.board
-    baseline = board.sensor.baseline
-    text = f"{min(baseline)} to {max(baseline)}" if baseline else "none"
-    frames = counted(board.start.frames, "frame")
-    say_rows(("measured", f"baseline {text}", f"from {frames}"), quiet=quiet)
-    for remark in started.remarks:
-        say(f"remark   {remark}", quiet=quiet)
-
-
-def _tell(
-    options: TactileRecordOptions,
-    line: Connection,
-    recorder: Recorder,
-    coming: _Coming,
-) -> None:
-    from fuzzytree.report import counted
-
-    rate = ""
-    if coming.seconds:
-        rate = f", {(coming.count - 1) / coming.seconds:.1f} a second"
-    frames = counted(coming.count, "frame")
-    facts = asdict(line.counters).items()
-    risk = counted(recorder.most_at_risk, "frame")
-    after = shlex.join(["fuzzytree", "tactile", "replay", options.output])
-    say_rows(
-        ("wrote", options.output, f"{frames}, {coming.seconds:.1f} s{rate}"),
-        ("counted", ", ".join(f"{name} {count}" for name, count in facts), ""),
-        ("at risk", f"{risk} at most, if the power had failed", ""),
-        ("next", after, ""),
-        quiet=options.quiet,
-    )
+    quiet, begun = options.quiet, line.now()
+    trouble, reconnects = "", line.counters.reconnects
+    while not stop.is_set():
+        frame = None
+        try:
+            frame = line.take(_LOOK_S)
+        except PortError as error:
+            if not line.counters.frames:
+                raise
+            say(str(error))
+        if line.counters.reconnects != reconnects:
+            trouble, reconnects = line.trouble, line.counters.reconnects
+            say(f"{line.port}: went away, and is back", quiet=quiet)
+        elif line.trouble != trouble and line.state != "ended":
+            trouble = line.trouble
+            say(trouble or f"{line.port}: frames come again", quiet=quiet)
+        is_late = options.seconds and line.now() - begun >= options.seconds
+        if frame is not None:
+            yield frame
+        elif is_late or line.state == "ended":
+            return
+    line.close()
+    with contextlib.suppress(PortError):  # it comes too late to matter
+        yield from line
