@@ -21,6 +21,7 @@ from fuzzytree.cli import (
     takes,
     wrong_options,
 )
+from fuzzytree.model import printable
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.recognition.live import Live, LiveResult
@@ -160,7 +161,7 @@ def _display(
     """Show a picture on a terminal; elsewhere yield what writes new, stable results."""
     from fuzzytree.tactile.cli.screen import Screen, ended_by_signals, look_of
     from fuzzytree.tactile.recognition.live import Hold
-    from fuzzytree.tactile.report.live import line_facts, lines, visible
+    from fuzzytree.tactile.report.live import line_facts, lines
 
     hold, said = Hold(options.hold), [""]
 
@@ -168,7 +169,7 @@ def _display(
         trouble = live.source.trouble
         if trouble not in ("", said[-1]):
             said.append(trouble)
-            say(visible(trouble))
+            say(trouble)
         for event in answer.events:
             say(event.text, quiet=options.quiet)
         shown = tuple(sorted((one.number, one.code) for one in answer.objects))
@@ -212,10 +213,10 @@ def _report(
     """Say what was answered, how fast, and what was out of the ordinary."""
     from fuzzytree.tactile.recognition.live import STATES
     from fuzzytree.tactile.recognition.recogniser import State
-    from fuzzytree.tactile.report.live import counts, timing, visible
+    from fuzzytree.tactile.report.live import counts, timing
 
     view, word = live.view(), STATES[State.UNKNOWN]
-    found = [f"{visible(label)} {count}" for label, count in sorted(labels.items())]
+    found = [f"{printable(label)} {count}" for label, count in sorted(labels.items())]
     unknown = labels[word]
     floor = (
         f"no rule, or one below {live.recogniser.reject:g}, decides; --reject sets it"

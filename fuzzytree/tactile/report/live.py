@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import astuple
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from rich.cells import cell_len, set_cell_size
+from rich.color import Color, ColorSystem
 
 from fuzzytree.model import printable
 from fuzzytree.tactile.interpolation import interpolated
@@ -17,7 +19,6 @@ from fuzzytree.tactile.recognition.live import (
     STATES,
     LiveResult,
     LiveView,
-    SensorObject,
 )
 
 if TYPE_CHECKING:
@@ -31,9 +32,8 @@ Look = Literal["full", "256", "plain"]
 SILENT_S = 1.0
 """After how long without a frame a display says so."""
 
-_RAMP = (" .", "::", "--", "==", "++", "**", "##", "%%", "@@")
 _EIGHTHS = " ▏▎▍▌▋▊▉"
-_BOLD, _DIM, _END = "\x1b[1m", "\x1b[2m", "\x1b[0m"
+_BOLD, _DIM = "1", "2"
 _NAME = 18  # the widest column of classes
 _BAR = 150  # the shade of a bar: it can be seen on white and on black
 _LEAST_LEGEND = 4  # signs of colours
@@ -45,36 +45,28 @@ def _palette() -> tuple[tuple[int, int, int], ...]:
 
     A turn in colour around the line of greys: the picture reads the same in grey.
     """
-    colours: list[tuple[int, int, int]] = []
-    for number in range(256):
-        light = 0.07 + 0.90 * number / 255
-        angle = 2 * math.pi * (0.2 / 3 + 1 - 0.6 * light)
-        reach = 1.5 * light * (1 - light) / 2
-        cos, sin = reach * math.cos(angle), reach * math.sin(angle)
-        red = light - 0.14861 * cos + 1.78277 * sin
-        green = light - 0.29227 * cos - 0.90649 * sin
-        blue = light + 1.97294 * cos
-        r, g, b = (min(max(round(255 * part), 0), 255) for part in (red, green, blue))
-        colours.append((r, g, b))
-    return tuple(colours)
+    light = 0.07 + 0.90 * np.arange(256) / 255
+    angle = 2 * math.pi * (0.2 / 3 + 1 - 0.6 * light)
+    turn = 0.75 * light * (1 - light) * np.array([np.cos(angle), np.sin(angle)])
+    mixed = np.array([(-0.14861, 1.78277), (-0.29227, -0.90649), (1.97294, 0.0)]) @ turn
+    colours = np.rint(255 * (light + mixed)).clip(0, 255).astype(int)
+    return tuple((r, g, b) for r, g, b in colours.T.tolist())
 
 
 PALETTE = _palette()
 """The colour of each share of full, from 0 to 255."""
 
 
-def _near_256(colour: tuple[int, int, int]) -> int:
-    """Return the number of the colour of the 6 x 6 x 6 cube that is nearest."""
-    steps = (0, 95, 135, 175, 215, 255)
-    r, g, b = (
-        min(range(6), key=lambda step: abs(steps[step] - part)) for part in colour
-    )
-    return 16 + 36 * r + 6 * g + b
-
-
+_SIGNS = [
+    (" .", "::", "--", "==", "++", "**", "##", "%%", "@@")[-(-shade * 8 // 255)]
+    for shade in range(256)
+]
 _CODES: dict[Look, list[str]] = {
     "full": [f"2;{r};{g};{b}" for r, g, b in PALETTE],
-    "256": [f"5;{_near_256(colour)}" for colour in PALETTE],
+    "256": [
+        f"5;{Color.from_rgb(*colour).downgrade(ColorSystem.EIGHT_BIT).number}"
+        for colour in PALETTE
+    ],
 }
 
 
@@ -119,49 +111,27 @@ def picture(
     rows, across = cells.shape
     fits = min(width // across, height // rows, times)
     if fits < 1:
-        cells = _coarse(cells, max(-(-across // width), -(-rows // height)))
-    points = shades(cells, full, max(fits, 1))
+        step = max(-(-across // width), -(-rows // height))
+        for axis, size in enumerate(cells.shape):
+            cells = np.maximum.reduceat(cells, range(0, size, step), axis)
+    points = shades(cells, full, max(fits, 1)).tolist()
     if look == "plain":
-        last = len(_RAMP) - 1
-        signs = [_RAMP[-(-shade * last // 255)] for shade in range(256)]
-        return ["".join(signs[shade] for shade in row) for row in points.tolist()]
-    if len(points) % 2:
-        points = np.vstack([points, np.zeros_like(points[:1])])
-    codes = _CODES[look]
-    pairs = zip(points[::2].tolist(), points[1::2].tolist(), strict=True)
-    return [_halves(upper, lower, codes) for upper, lower in pairs]
+        return [_line(row, row, look) for row in points]
+    pairs = zip_longest(points[::2], points[1::2], fillvalue=[0] * len(points[0]))
+    return [_line(upper, lower, look) for upper, lower in pairs]
 
 
-def _coarse(cells: Cells, step: int) -> Cells:
-    """Return the largest cell of each square of `step` cells on a side."""
-    rows, columns = (-(-side // step) for side in cells.shape)
-    wide = np.zeros((rows * step, columns * step), cells.dtype)
-    wide[: cells.shape[0], : cells.shape[1]] = cells
-    largest: Cells = wide.reshape(rows, step, columns, step).max(axis=(1, 3))
-    return largest
-
-
-def _halves(upper: Sequence[int], lower: Sequence[int], codes: Sequence[str]) -> str:
-    """Return two rows of points as one line of half blocks."""
-    parts: list[str] = []
-    before = ("", "")
-    for up, down in zip(upper, lower, strict=True):
-        colours = codes[up], codes[down]
-        if colours != before:
-            parts.append(f"\x1b[38;{colours[0]};48;{colours[1]}m")
-            before = colours
+def _line(upper: Sequence[int], lower: Sequence[int], look: Look) -> str:
+    """Return two rows of points as one line of half blocks; without colour, one row."""
+    if look == "plain":
+        return "".join(_SIGNS[shade] for shade in upper)
+    codes, parts, before = _CODES[look], [], (-1, -1)
+    for pair in zip(upper, lower, strict=True):
+        if pair != before:
+            parts.append(f"\x1b[38;{codes[pair[0]]};48;{codes[pair[1]]}m")
+            before = pair
         parts.append("▀")
-    return "".join([*parts, _END])
-
-
-def visible(text: str) -> str:
-    """Return a text in which no sign controls the terminal.
-
-    Example:
-        >>> visible("soft" + chr(27) + "[2J")
-        'soft?[2J'
-    """
-    return "".join(sign if sign.isprintable() else "?" for sign in text)
+    return "".join([*parts, "\x1b[0m"])
 
 
 def headline(view: LiveView) -> str:
@@ -172,7 +142,7 @@ def headline(view: LiveView) -> str:
     if answer.state is None:
         return "a frame that does not fit"
     names = [one.label or SENTENCES[one.state] for one in answer.objects]
-    return visible(" + ".join(names)) or SENTENCES[answer.state]
+    return printable(" + ".join(names)) or SENTENCES[answer.state]
 
 
 def status(view: LiveView) -> str:
@@ -182,17 +152,22 @@ def status(view: LiveView) -> str:
     parts = [view.trouble] if view.trouble else []
     if view.silent_s >= SILENT_S:
         parts.append(f"no frame for {view.silent_s:.0f} s")
-    return visible("; ".join(parts))
+    return printable("; ".join(parts))
 
 
-def whereabouts(found: SensorObject) -> str:
-    """Return where the centre of pressure of an object is, and how many cells press.
+def places(answer: LiveResult) -> list[str]:
+    """Return where the centre of pressure of each object is, and how many cells press.
 
-    From the middle of the sensor, to the right and upwards.
+    From the middle of the sensor, to the right and upwards; of the first three.
     """
-    unit = found.recogniser.sensor.unit
-    force = f"; force {found.force:.3g} {unit}" if unit else ""
-    return f"centre {found.x:+.1f}, {found.y:+.1f}; {found.region.area} cells{force}"
+    found: list[str] = []
+    for one in answer.objects[:3]:
+        unit = one.recogniser.sensor.unit
+        number = f"{one.number} " if len(answer.objects) > 1 else ""
+        force = f"; force {one.force:.3g} {unit}" if unit else ""
+        centre = f"centre {one.x:+.1f}, {one.y:+.1f}; {one.region.area} cells"
+        found.append(f"{number}{centre}{force}")
+    return found
 
 
 def counts(view: LiveView) -> str:
@@ -223,101 +198,85 @@ def screen(
     keys: str = "Ctrl-C ends",
 ) -> str:
     """Return a whole screen: at most `lines` lines of at most `columns` signs."""
-    bold, dim = (_BOLD, _DIM) if look != "plain" else ("", "")
-    end = _END if bold else ""
-    head = f"{visible(view.source)} -> {visible(view.model)}"
-    foot = [counts(view), timing(view), status(view) or keys]
-    styles = [dim, dim, bold if status(view) else dim]
-    room = max(lines - len(foot) - 2, 1)
+    room = max(lines - 5, 1)  # beside the title and the last lines
     is_wide = columns >= 2 * _SIDE
-    beside = columns - _SIDE if is_wide else columns
-    above = room if is_wide else max(room - min(len(view.classes), 4) - 2, 1)
-    drawn: list[str] = []
-    cells = view.answer.cells if view.answer else None
-    if cells is not None:
-        full = view.sensor.full
-        drawn = picture(cells, full, beside, above - 1, look=look, times=times)
-        drawn.append(_legend(view.sensor.range_text, drawn, look=look))
-    facts = _facts(view, room if is_wide else room - len(drawn), look=look)
-    body = _side_by_side(drawn, facts) if is_wide else [*drawn, *facts]
-    footer = [
-        f"{style}{_cut(text, columns)}{end}"
-        for style, text in zip(styles, foot, strict=True)
-    ]
-    title = f"{bold}{_cut(head, columns)}{end}"
-    return "\n".join([title, *body[:room], "", *footer][:lines])
-
-
-def _legend(full: str, drawn: Sequence[str], *, look: Look) -> str:
-    """Return the colours of 0 to full in a line as wide as a picture."""
-    width = drawn[0].count("▀") or len(drawn[0])
-    low, high = "0 ", f" {full}"
-    room = width - len(low) - len(high)
-    if room < _LEAST_LEGEND:
-        return " " * width
-    shades_shown = [255 * place // (room - 1) for place in range(room)]
-    if look == "plain":
-        last = len(_RAMP) - 1
-        bar = "".join(_RAMP[-(-one * last // 255)][1] for one in shades_shown)
+    beside = _SIDE if is_wide else 0
+    below = 0 if is_wide else min(len(view.classes), 4) + 2
+    body: list[str] = []
+    width = 0
+    if view.answer is not None and view.answer.cells is not None:
+        size = columns - beside, max(room - below, 1) - 1
+        cells, sensor = view.answer.cells, view.sensor
+        body = picture(cells, sensor.full, *size, look=look, times=times)
+        width = body[0].count("▀") or len(body[0])
+        body.append(_legend(sensor.range_text, width, look))
+    facts = _facts(view, room if is_wide else room - len(body), look)
+    if is_wide and body:
+        pairs = zip_longest(body, facts, fillvalue="")
+        body = [f"{left or ' ' * width}  {right}" for left, right in pairs]
     else:
-        codes = _CODES[look]
-        bar = "".join(f"\x1b[38;{codes[one]}m▀" for one in shades_shown) + _END
-    return f"{low}{bar}{high}"
+        body += facts
+    wrong = status(view)
+    title = f"{printable(view.source)} -> {printable(view.model)}"
+
+    def line(text: str, code: str) -> str:
+        return _styled(_cut(text, columns), code, look)
+
+    foot = [line(counts(view), _DIM), line(timing(view), _DIM)]
+    foot.append(line(wrong or keys, _BOLD if wrong else _DIM))
+    return "\n".join([line(title, _BOLD), *body[:room], "", *foot][:lines])
 
 
-def _side_by_side(drawn: Sequence[str], facts: Sequence[str]) -> list[str]:
-    """Put facts right of a picture, whose lines are all of one width."""
-    if not drawn:
-        return [*facts]
-    rows = max(len(drawn), len(facts))
-    width = drawn[0].count("▀") or len(drawn[0])
-    left = [*drawn, *[" " * width] * (rows - len(drawn))]
-    right = [*facts, *[""] * (rows - len(facts))]
-    return [f"{a}  {b}" for a, b in zip(left, right, strict=True)]
+def _legend(full: str, width: int, look: Look) -> str:
+    """Return the colours of 0 to full in a line as wide as a picture."""
+    signs = 2 if look == "plain" else 1
+    count, rest = divmod(width - len(f"0  {full}"), signs)
+    if count < _LEAST_LEGEND:
+        return " " * width
+    row = [255 * place // (count - 1) for place in range(count)]
+    return f"0 {_line(row, row, look)} {' ' * rest}{full}"
 
 
-def _facts(view: LiveView, lines: int, *, look: Look) -> list[str]:
-    """Return the answer and the strengths of the classes."""
-    bold, end = ("", "") if look == "plain" else (_BOLD, _END)
-    found = [f"{bold}{_cut(headline(view), _SIDE - 2)}{end}"]
+def _facts(view: LiveView, lines: int, look: Look) -> list[str]:
+    """Return the answer and the strengths of the classes, the largest if few fit."""
+    found = [_styled(_cut(headline(view), _SIDE - 2), _BOLD, look)]
     answer = view.answer
     if answer is None or not answer.objects:
         return [*found, ""]
-    for one in answer.objects[:3]:
-        name = f"{one.number} " if len(answer.objects) > 1 else ""
-        found.append(_cut(name + whereabouts(one), _SIDE - 2))
-    found.append("")
-    room = max(lines - len(found), 0)
-    count = room if room >= len(view.classes) else max(room - 1, 0)
+    found += [*(_cut(text, _SIDE - 2) for text in places(answer)), ""]
     first = answer.objects[0]
-    order = sorted(
-        range(len(first.strengths)), key=lambda place: -first.strengths[place]
-    )
-    places = sorted(order[:count])  # in the order of the classes
-    names = [visible(name) for name in view.classes]
+    strengths, count = first.strengths, len(view.classes)
+    room = max(lines - len(found), 0)
+    most = room if room >= count else max(room - 1, 0)
+    largest = sorted(range(count), key=lambda place: -strengths[place])[:most]
+    names = [printable(name) for name in view.classes]
     width = min(max(map(cell_len, names)), _NAME)
-    for place in places:
-        name = set_cell_size(names[place], width)
-        own = first.strengths[place]
-        bar = _bar(own, _SIDE - 9 - width, look=look)
-        style = bold if place == first.code else ""
-        found.append(f"{style}{name} {own:4.2f} {bar}{end if style else ''}")
-    if len(places) < len(view.classes) and room:
-        found.append(f"and {len(view.classes) - len(places)} weaker ones")
+    for place in sorted(largest):  # in the order of the classes
+        name, own = set_cell_size(names[place], width), strengths[place]
+        text = f"{name} {own:4.2f} "
+        if place == first.code:
+            text = _styled(text, _BOLD, look)
+        found.append(text + _bar(own, _SIDE - 9 - width, look))
+    if most < count and room:
+        found.append(f"and {count - most} weaker ones")
     return found
 
 
-def _bar(share: float, width: int, *, look: Look) -> str:
+def _bar(share: float, width: int, look: Look) -> str:
     """Return a bar of so many signs for a share of 1."""
     if look == "plain":
         return "#" * round(share * width)
-    eighths = round(share * width * 8)
-    bar = "█" * (eighths // 8) + _EIGHTHS[eighths % 8].strip()
-    return f"\x1b[38;{_CODES[look][_BAR]}m{bar}{_END}" if bar else ""
+    whole, part = divmod(round(share * width * 8), 8)
+    bar = "█" * whole + _EIGHTHS[part].strip()
+    return _styled(bar, f"38;{_CODES[look][_BAR]}", look)
+
+
+def _styled(text: str, code: str, look: Look) -> str:
+    return text if look == "plain" else f"\x1b[{code}m{text}\x1b[0m"
 
 
 def _cut(text: str, columns: int) -> str:
-    return text if cell_len(text) <= columns else set_cell_size(text, columns)
+    return set_cell_size(text, columns).rstrip()
 
 
 def line_facts(answer: LiveResult) -> list[dict[str, object]]:
@@ -326,22 +285,21 @@ def line_facts(answer: LiveResult) -> list[dict[str, object]]:
     Without an object there is one line, whose fields of an object are None.
     """
     state = "unknown" if answer.state is None else STATES[answer.state]
-    begin: dict[str, object] = {
+    facts: dict[str, object] = {
         "time": round(answer.frame.time, 6),
         "frame": answer.frame.number,
+        "state": state,
+        "class": None,
+        "strength": 0.0,
+        "saturated": answer.saturated,
+        **dict.fromkeys(("object", "x", "y", "angle", "area", "force", "box")),
     }
-    if not answer.objects:
-        begin |= {"state": state, "class": None, "strength": 0.0}
-        begin |= {"saturated": answer.saturated, "object": None}
-        begin.update(dict.fromkeys(_PLACE))
-        return [begin]
-    return [
-        begin
+    found = [
+        facts
         | {
             "state": STATES[one.state],
             "class": one.label or None,
             "strength": one.strength,
-            "saturated": answer.saturated,
             "object": one.number,
             "x": round(one.x, 3),
             "y": round(one.y, 3),
@@ -352,9 +310,7 @@ def line_facts(answer: LiveResult) -> list[dict[str, object]]:
         }
         for one in answer.objects
     ]
-
-
-_PLACE: tuple[str, ...] = ("x", "y", "angle", "area", "force", "box")
+    return found or [facts]
 
 
 def lines(answer: LiveResult) -> str:
@@ -369,20 +325,8 @@ def lines(answer: LiveResult) -> str:
     def text(value: object) -> str:
         if isinstance(value, tuple):
             return ",".join(map(str, value))
-        if isinstance(value, str):
-            return escaped(value)
-        return "" if value is None else str(value)
+        return "" if value is None else printable(str(value).replace("\\", "\\\\"))
 
     return "\n".join(
         "\t".join(map(text, facts.values())) for facts in line_facts(answer)
     )
-
-
-def escaped(text: str) -> str:
-    r"""Return a text that fits between tabs, and commands no terminal.
-
-    Example:
-        >>> print(escaped("a\tb" + chr(27)))
-        a\tb\x1b
-    """
-    return printable(text.replace("\\", "\\\\"))

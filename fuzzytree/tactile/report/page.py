@@ -8,6 +8,7 @@ import dataclasses
 import hashlib
 import re
 import socket
+import sys
 import threading
 import time
 from http import HTTPStatus
@@ -19,25 +20,18 @@ import msgspec
 
 from fuzzytree.errors import PortError
 from fuzzytree.files import reason
-from fuzzytree.tactile.recognition.live import (
-    SENTENCES,
-    STATES,
-    Live,
-    LiveResult,
-    LiveView,
-)
-from fuzzytree.tactile.recognition.recogniser import State
+from fuzzytree.tactile.recognition.live import STATES, Live, LiveView
 from fuzzytree.tactile.report.live import (
     PALETTE,
+    counts,
     headline,
+    places,
     shades,
     status,
-    whereabouts,
+    timing,
 )
 
 if TYPE_CHECKING:
-    from socketserver import BaseServer
-
     from fuzzytree.tactile.sensor import Cells
 
 ADDRESS = "127.0.0.1"
@@ -49,7 +43,7 @@ MOST_BROWSERS = 8
 _REFRESHES = 30  # a second, at most
 _PATIENCE_S = 10.0  # for an idle browser
 _ALIVE_S = 0.5  # between two events where no frames come
-_RETRY_MS = 1000  # before a browser reconnects
+_RETRY = b"retry: 1000\n\n"  # milliseconds before a browser reconnects
 _BACKLOG = 1 << 16  # bytes that wait for a slow browser: newer frames replace older
 _MOST_POINTS = 1 << 16  # of a picture
 
@@ -57,6 +51,7 @@ _TARE = ("POST", "/tare")
 _EVENTS = re.compile(r"/events(?:\?times=([1-9]))?")
 
 _HEADERS = {
+    "Allow": "GET",
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
@@ -66,7 +61,7 @@ _HEADERS = {
 }
 
 
-class LivePage(contextlib.AbstractContextManager["LivePage"]):
+class LivePage(ThreadingHTTPServer):
     """Serves the page of what is recognised, in threads, until it is closed.
 
     It listens on 127.0.0.1, answers only what names that host (a page of another name
@@ -79,20 +74,35 @@ class LivePage(contextlib.AbstractContextManager["LivePage"]):
 
     Attributes:
         url: Where the page is.
+        hosts: The names of this host, with the port.
+        content: The page.
+        policy: What the page may do in a browser.
+        is_closing: Set when the browsers hear that it is over.
 
     Raises:
         PortError: If the port cannot be had.
     """
 
+    daemon_threads = True
+    block_on_close = False
+    request_queue_size = MOST_BROWSERS
+
     def __init__(self, live: Live, port: int = 0, *, times: int = 3) -> None:
+        self.live, self.times = live, times
+        self.is_closing = threading.Event()
+        self._room = threading.BoundedSemaphore(MOST_BROWSERS)
+        content = resources.files("fuzzytree.tactile.report").joinpath("live.html")
+        self.content = content.read_bytes()
+        self.policy = _policy(self.content.decode())
         try:
-            self._server = _Server(live, port, times)
+            super().__init__((ADDRESS, port), _Handler)
         except (OSError, OverflowError) as error:
             why = reason(error) if isinstance(error, OSError) else str(error)
             raise PortError(f"{ADDRESS}:{port}: cannot be served: {why}") from error
-        self.url = f"http://{ADDRESS}:{self._server.server_port}/"
+        self.hosts = {f"{name}:{self.server_port}" for name in (ADDRESS, "localhost")}
+        self.url = f"http://{ADDRESS}:{self.server_port}/"
         self._thread = threading.Thread(
-            target=self._server.serve_forever, args=(0.05,), name="page", daemon=True
+            target=self.serve_forever, args=(0.05,), name="page", daemon=True
         )
         self._thread.start()
 
@@ -101,29 +111,14 @@ class LivePage(contextlib.AbstractContextManager["LivePage"]):
         self.close()
 
     def close(self) -> None:
-        """Let the browsers hear that it is over, and serve no more."""
-        self._server.is_closing.set()
-        self._server.wait_for_browsers(1.0)
-        self._server.shutdown()
-        self._server.server_close()
+        """Let the browsers hear that it is over, for a second, and serve no more."""
+        self.is_closing.set()
+        end = time.monotonic() + 1.0
+        for _ in range(MOST_BROWSERS):
+            self._room.acquire(timeout=max(end - time.monotonic(), 0.0))
+        self.shutdown()
+        self.server_close()
         self._thread.join()
-
-
-class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-    block_on_close = False
-    request_queue_size = MOST_BROWSERS
-
-    def __init__(self, live: Live, port: int, times: int) -> None:
-        self.live, self.times = live, times
-        self.is_closing = threading.Event()
-        self._room = threading.BoundedSemaphore(MOST_BROWSERS)
-        content = resources.files("fuzzytree.tactile.report").joinpath("live.html")
-        self.content = content.read_bytes()
-        self.policy = _policy(self.content.decode())
-        super().__init__((ADDRESS, port), _Handler)
-        names = (ADDRESS, "localhost")
-        self.hosts = {f"{name}:{self.server_port}" for name in names}
 
     def process_request(
         self, request: socket.socket | tuple[bytes, socket.socket], client_address: Any
@@ -146,11 +141,12 @@ class _Server(ThreadingHTTPServer):
         finally:
             self._room.release()
 
-    def wait_for_browsers(self, seconds: float) -> None:
-        """Wait until no connection is served any more."""
-        end = time.monotonic() + seconds
-        for _ in range(MOST_BROWSERS):
-            self._room.acquire(timeout=max(end - time.monotonic(), 0.0))
+    def handle_error(
+        self, request: socket.socket | tuple[bytes, socket.socket], client_address: Any
+    ) -> None:
+        """Let a browser go away at any time."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -158,22 +154,11 @@ class _Handler(BaseHTTPRequestHandler):
     server_version = "fuzzytree"
     sys_version = ""
 
-    def __init__(
-        self, request: socket.socket, client_address: Any, server: BaseServer
-    ) -> None:
-        assert isinstance(server, _Server)
-        self.own = server
-        super().__init__(request, client_address, server)
-
-    def handle(self) -> None:
-        """Answer a browser, which may go away at any time."""
-        with contextlib.suppress(OSError):
-            super().handle()
-
-    def finish(self) -> None:
-        """Close the connection, which may be gone."""
-        with contextlib.suppress(OSError):
-            super().finish()
+    @property
+    def page(self) -> LivePage:
+        """The server of this connection."""
+        assert isinstance(self.server, LivePage)
+        return self.server
 
     def log_message(self, format: str, *args: Any) -> None:
         """Say nothing: the terminal shows a picture."""
@@ -182,14 +167,15 @@ class _Handler(BaseHTTPRequestHandler):
         """Refuse what is no GET, or is meant for another host."""
         if not super().parse_request():
             return False
+        hosts = self.page.hosts
         origin = self.headers.get("Origin", "").lower().removeprefix("http://")
         if self.command != "GET" and (self.command, self.path) != _TARE:
-            self._refuse(HTTPStatus.METHOD_NOT_ALLOWED, "only GET is answered")
-        elif self.headers.get("Host", "").lower() not in self.own.hosts:
-            self._refuse(HTTPStatus.MISDIRECTED_REQUEST, "this is another host")
-        elif (origin or self.command == "POST") and origin not in self.own.hosts:
+            self._answer(HTTPStatus.METHOD_NOT_ALLOWED, b"only GET is answered\n")
+        elif self.headers.get("Host", "").lower() not in hosts:
+            self._answer(HTTPStatus.MISDIRECTED_REQUEST, b"this is another host\n")
+        elif (origin or self.command == "POST") and origin not in hosts:
             # the page of another site
-            self._refuse(HTTPStatus.FORBIDDEN, "only this page is answered")
+            self._answer(HTTPStatus.FORBIDDEN, b"only this page is answered\n")
         else:
             return True
         return False
@@ -197,96 +183,83 @@ class _Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         """Answer with the page, or with events."""
         if self.path == "/":
-            self._begin(HTTPStatus.OK, "text/html; charset=utf-8")
-            self.wfile.write(self.own.content)
+            self._answer(HTTPStatus.OK, self.page.content, "text/html")
         elif found := _EVENTS.fullmatch(self.path):
-            self._begin(HTTPStatus.OK, "text/event-stream")
-            self._send_events(int(found[1] or self.own.times))
+            self._answer(HTTPStatus.OK, _RETRY, "text/event-stream")
+            self._send_events(int(found[1] or self.page.times))
         else:
-            self._refuse(HTTPStatus.NOT_FOUND, "there is / and nothing else")
+            self._answer(HTTPStatus.NOT_FOUND, b"there is / and nothing else\n")
 
     def do_POST(self) -> None:
         """Tare the sensor."""
-        self.own.live.tare()
-        self._begin(HTTPStatus.NO_CONTENT, "text/plain; charset=utf-8")
+        self.page.live.tare()
+        self._answer(HTTPStatus.NO_CONTENT)
 
-    def _begin(self, code: HTTPStatus, kind: str) -> None:
+    def _answer(
+        self, code: HTTPStatus, content: bytes = b"", kind: str = "text/plain"
+    ) -> None:
         self.send_response(code)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Security-Policy", self.own.policy)
-        if code == HTTPStatus.METHOD_NOT_ALLOWED:
-            self.send_header("Allow", "GET")
+        self.send_header("Content-Type", f"{kind}; charset=utf-8")
+        self.send_header("Content-Security-Policy", self.page.policy)
         for name, value in _HEADERS.items():
             self.send_header(name, value)
         self.end_headers()
-
-    def _refuse(self, code: HTTPStatus, text: str) -> None:
-        self._begin(code, "text/plain; charset=utf-8")
-        self.wfile.write(f"{text}\n".encode())
+        self.wfile.write(content)
 
     def _send_events(self, times: int) -> None:
         """Send what there is to see, the newest only, until it is over."""
-        live, server = self.own.live, self.own
+        live = self.page.live
         self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BACKLOG)
-        self.wfile.write(b"retry: %d\n\n" % _RETRY_MS)
-        self._send("hello", hello_facts(live.view()))
-        seen, is_over = 0, False
-        while not is_over:
+        view, seen = live.view(), 0
+        names = {"source": view.source, "model": view.model}
+        scale = {"full": view.sensor.range_text, "palette": PALETTE}
+        self._send("hello", {**names, **scale, "classes": view.classes})
+        while True:
+            is_over = view.is_over or self.page.is_closing.is_set()
+            view = dataclasses.replace(view, is_over=is_over)
+            self._send("view", view_facts(view, times))
+            if is_over:
+                return
+            time.sleep(1 / _REFRESHES)
+            seen = live.wait(seen, _ALIVE_S)
             view = live.view()
-            is_over = view.is_over or server.is_closing.is_set()
-            self._send("view", view_facts(view, times, is_over=is_over))
-            if not is_over:
-                time.sleep(1 / _REFRESHES)
-                seen = live.wait(seen, _ALIVE_S)
 
-    def _send(self, name: str, facts: dict[str, object]) -> None:
+    def _send(self, name: str, facts: object) -> None:
         data = msgspec.json.encode(facts)
         self.wfile.write(b"event: %s\ndata: %s\n\n" % (name.encode(), data))
 
 
 def _policy(page: str) -> str:
     """Return what the page may do: run its own script and style, and ask this host."""
-    sources: list[str] = []
+    policy = "default-src 'none'; "
     for kind in ("script", "style"):
-        found = re.search(f"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
-        content = found[1] if found else ""
+        content = page.partition(f"<{kind}>")[2].partition(f"</{kind}>")[0]
         digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
-        sources.append(f"{kind}-src 'sha256-{digest}'")
-    rest = (
+        policy += f"{kind}-src 'sha256-{digest}'; "
+    return policy + (
         "connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; "
         "frame-ancestors 'none'"
     )
-    return "; ".join(("default-src 'none'", *sources, rest))
 
 
-def hello_facts(view: LiveView) -> dict[str, object]:
-    """Return the constant facts of the page: names, classes and colours."""
-    return {
-        "source": view.source,
-        "model": view.model,
-        "classes": view.classes,
-        "full": view.sensor.range_text,
-        "palette": PALETTE,
-    }
-
-
-def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object]:
-    """Return what a page shows at one moment, the last one if it is over.
+def view_facts(view: LiveView, times: int) -> dict[str, object]:
+    """Return what a page shows at one moment.
 
     The picture has at most `times` points for a cell on each side; `cells` has one.
     """
     answer = view.answer
     state = answer.state if answer else None
     first = answer.objects[0] if answer and answer.objects else None
+    rows = (("took", timing(view)), ("counted", counts(view)))
     facts: dict[str, object] = {
         "state": "waiting" if state is None else STATES[state],
         "headline": headline(view),
-        "sentence": _sentence(answer),
+        "places": "\n".join(places(answer)) if answer else "",
         "code": first.code if first else -1,
         "strengths": first.strengths if first else (),
-        "facts": [*_numbers(view)],
-        "status": status(dataclasses.replace(view, is_over=is_over)),
-        "over": is_over,
+        "facts": [row for row in rows if row[1]],
+        "status": status(view),
+        "over": view.is_over,
     }
     if answer is not None and answer.cells is not None:
         while times > 1 and answer.cells.size * times**2 > _MOST_POINTS:
@@ -305,28 +278,3 @@ def _points(view: LiveView, cells: Cells, times: int) -> dict[str, object]:
     points = shades(cells, view.sensor.full, times)
     packed = base64.b64encode(points.tobytes()).decode()
     return {"shape": points.shape, "points": packed}
-
-
-def _sentence(answer: LiveResult | None) -> str:
-    if answer is None or answer.state is None:
-        return ""
-    if len(answer.objects) > 1:
-        return f"{len(answer.objects)} objects; the strengths are the first one's"
-    if answer.objects and answer.state is State.OBJECT:
-        (one,) = answer.objects
-        where = whereabouts(one)
-        return f"{SENTENCES[one.state]}, strength {one.strength:.2f}; {where}"
-    return "the sensor is free" if answer.state is State.NOTHING else "rejected"
-
-
-def _numbers(view: LiveView) -> list[tuple[str, str]]:
-    """Return the rate, the latency and the counters, as names and texts."""
-    rows = [("frames a second", f"{view.rate:.1f}")]
-    if view.latency is not None:
-        names = ("median", "99 %", "largest")
-        for name, seconds in zip(names, dataclasses.astuple(view.latency), strict=True):
-            rows.append((f"answer after, {name}", f"{1e3 * seconds:.2f} ms"))
-    shown = ("frames", "damaged", "dropped", "stalls", "reconnects")
-    rows += [(name, str(view.counters[name])) for name in shown]
-    others = {**view.counters, "refused": view.refused}
-    return rows + [(k, str(n)) for k, n in others.items() if n and k not in shown]

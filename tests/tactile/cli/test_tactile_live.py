@@ -422,7 +422,7 @@ def test_nobody_who_reads_the_lines_ends_live_quietly(
 ) -> None:
     words = [sys.executable, "-m", "fuzzytree", "tactile", "live", *FOREVER]
     with subprocess.Popen(
-        [*words, "--speed", "0", "--hold", "1"],
+        [*words, "--speed", "0", "--hold", "1", "--quiet"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
