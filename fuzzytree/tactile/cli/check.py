@@ -52,8 +52,8 @@ def command(options: TactileCheckOptions) -> int:
     from fuzzytree.tactile.presses import read_frames
     from fuzzytree.tactile.recognition.checking import check_frames
 
-    settings = (options.board, options.size, options.full, options.threshold)
-    is_named = settings != (None,) * 4
+    settings = (options.board, options.sensor, options.full, options.threshold)
+    is_named = any(one is not None for one in settings)
     with wrong_options():
         found = check_frames(
             frames_model(options.model),

@@ -61,7 +61,10 @@ def command(options: TactileExportOptions) -> int:
     stdout.
     """
     from fuzzytree.exporters import require
+    from fuzzytree.model import Format
     from fuzzytree.report import agreement_lines, agreement_verdict
+    from fuzzytree.tactile.exporters import onnx_frames
+    from fuzzytree.tactile.exporters.c_frames import write_frames_c
     from fuzzytree.tactile.recognition.checking import check_frames
     from fuzzytree.tactile.recognition.recogniser import Recogniser, State, check_inputs
     from fuzzytree.tactile.sensor import saturated
@@ -70,7 +73,10 @@ def command(options: TactileExportOptions) -> int:
     if form not in _FORMS:
         text = "a file from frame to class ends in .onnx or .c"
         raise click.UsageError(f"{options.output}: {text}")
-    write, values = _writer(form, options.settings)
+    write: Any = write_frames_c if form == "c" else onnx_frames.write_frames
+    with wrong_options():
+        known = Format(form, (f".{form}",), ("tree", "rules"), write)  # for its options
+        values: dict[str, Any] = option_values(known, map(setting, options.settings))
     if form == "onnx":
         require("onnxruntime", "verifying a written onnx file needs")
     if options.output != "-":
@@ -115,15 +121,3 @@ def command(options: TactileExportOptions) -> int:
     said = f"{form}, {len(written.content)} bytes, sha256 {digest}"
     say_rows(("wrote", options.output, said), quiet=options.quiet)
     return 0
-
-
-def _writer(form: str, settings: Sequence[str]) -> tuple[Any, dict[str, Any]]:
-    """Return the writer of a form, and its options from `--set`."""
-    from fuzzytree.model import Format
-    from fuzzytree.tactile.exporters.c_frames import write_frames_c
-    from fuzzytree.tactile.exporters.onnx_frames import write_frames
-
-    write: Any = write_frames_c if form == "c" else write_frames
-    known = Format(form, (f".{form}",), ("tree", "rules"), write)  # for its options
-    with wrong_options():
-        return write, option_values(known, map(setting, settings))

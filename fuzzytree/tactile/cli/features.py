@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from fuzzytree.cli import (
+    answer,
     answer_bytes,
     answer_json,
     argument,
@@ -24,7 +25,7 @@ from fuzzytree.cli import (
 )
 from fuzzytree.errors import ReadError
 from fuzzytree.files import check_place, write_atomically
-from fuzzytree.tactile.cli.sensors import FramesOptions, board_of_option
+from fuzzytree.tactile.cli.sensors import FramesOptions, board_of_options
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.runtimes.frames import Features
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 USUAL = "log orientation / force,log area"
 """Features that depend little on the force of a press and on the gain of the sensor."""
 
-FEW_PLACEMENTS = 10
 CLASS = "class"
 """The column of the classes."""
 
@@ -41,6 +41,9 @@ SUBJECT = "subject"
 
 PLACEMENT = "placement"
 """The column of the placements, from 1, of frames that follow each other."""
+
+
+_ALIKE = {SUBJECT: "states subjects", PLACEMENT: "is a recording"}
 
 
 class TactileFeaturesOptions(FramesOptions):
@@ -60,7 +63,7 @@ class TactileFeaturesOptions(FramesOptions):
 
 @click.command("features", short_help="Turn frames into a table of features.")
 @takes(TactileFeaturesOptions)
-def command(options: TactileFeaturesOptions) -> int:
+def command(options: TactileFeaturesOptions) -> None:
     """Compute features of FRAMES: a recording, an archive (.npz) or a table (.csv).
 
     With -o they become a table for `fuzzytree learn`; without it, the cost of each
@@ -75,33 +78,33 @@ def command(options: TactileFeaturesOptions) -> int:
         check_place(options.output)
     with wrong_options():
         names = names_of(options.text)
-    counts: Counter[str] = Counter()
-    parts = [*_parts(options, counts)]
+    parts = [*_parts(options)]
     _check_alike(options.frames, parts)
     found = costs(parts[0].sensor, names)
     if options.output is not None:
-        return _table(options, options.output, parts, found, counts)
-    if options.as_json:
+        _table(options, options.output, parts, found)
+    elif options.as_json:
         answer_json({"costs": found})
     else:
         for name in names:
-            click.echo(f"{found[name]:8.0f}  {name}")
-    return 0
+            answer(f"{found[name]:8.0f}  {name}")
 
 
 class _Part(NamedTuple):
-    """The frames of a file, the sensor they fit, and the columns that are known."""
+    """The frames of a file, the sensor they fit, and the columns that are known.
+
+    And how many frames have saturated cells, and several objects.
+    """
 
     frames: Cells
     sensor: Sensor
     columns: dict[str, Sequence[Any]]
+    saturated: int
+    several: int
 
 
-def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_Part]:
-    """Yield the frames of each file, of the class that stands before its name.
-
-    Count frames with saturated cells, with several objects, and placements.
-    """
+def _parts(options: TactileFeaturesOptions) -> Iterator[_Part]:
+    """Yield the frames of each file, of the class that stands before its name."""
     import numpy as np
 
     from fuzzytree.tactile.link.recording import Recording
@@ -110,10 +113,8 @@ def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_P
     from fuzzytree.tactile.rest import Rest
     from fuzzytree.tactile.sensor import saturated
 
-    placed, board = 0, None
+    placed, board = 0, board_of_options(options)
     own = {"full": options.full, "threshold": options.threshold}
-    if options.board is not None:
-        board = board_of_option(options.board, "--full and", [*own.values()])
     for text in options.frames:
         word, sign, path = text.partition("=")
         if not sign or Path(text).exists():
@@ -132,7 +133,7 @@ def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_P
                     columns[SUBJECT] = file.subject.tolist()
             if isinstance(file, Recording) and not file.is_stream:
                 frames, sensor = file.frames, file.sensor
-                counts["saturated"] += int((saturated(sensor, frames) > 0).sum())
+                full, several = int((saturated(sensor, frames) > 0).sum()), 0
                 if file.board.calibration is not None:
                     rest = Rest(sensor, 0.0, file.board.calibration)
                     frames = np.array([rest(frame, 0.0) for frame in frames])
@@ -140,15 +141,14 @@ def _parts(options: TactileFeaturesOptions, counts: Counter[str]) -> Iterator[_P
             else:
                 seen = followed(file)
                 frames, sensor = seen.frames, seen.sensor
-                counts["saturated"] += seen.saturated
-                counts["several"] += seen.several
+                full, several = seen.saturated, seen.several
                 columns[PLACEMENT] = (seen.placements + placed).tolist()
                 placed += int(seen.placements.max(initial=0))
         if not len(frames):
             raise ReadError(f"{path}: holds no frame")
         if word:
             columns[CLASS] = [word] * len(frames)
-        yield _Part(frames, sensor, columns)
+        yield _Part(frames, sensor, columns, full, several)
 
 
 def _check_alike(frames: Sequence[str], parts: Sequence[_Part]) -> None:
@@ -157,22 +157,18 @@ def _check_alike(frames: Sequence[str], parts: Sequence[_Part]) -> None:
     Sensors may only differ in what rests on them, and all state subjects or none does.
     """
 
-    def kind(part: _Part) -> str:
-        found = part.sensor
+    def kind(found: Sensor) -> str:
         size = f"{found.rows} x {found.columns} cells"
         return f"{size}, full {found.range_text}, threshold {found.threshold}"
 
+    columns, own = parts[0].columns, kind(parts[0].sensor)
     for name, part in zip(frames, parts, strict=True):
-        if kind(part) != kind(parts[0]):
-            raise ReadError(
-                f"{name}: is of another sensor ({kind(part)}) than {frames[0]} "
-                f"({kind(parts[0])})"
-            )
-        for column, text in (
-            (SUBJECT, "states subjects"),
-            (PLACEMENT, "is a recording"),
-        ):
-            if (column in part.columns) != (column in parts[0].columns):
+        other = kind(part.sensor)
+        if other != own:
+            text = f"is of another sensor ({other}) than {frames[0]} ({own})"
+            raise ReadError(f"{name}: {text}")
+        for column, text in _ALIKE.items():
+            if (column in part.columns) != (column in columns):
                 raise ReadError(f"of {name} and {frames[0]}, only one {text}")
 
 
@@ -181,8 +177,8 @@ def _table(
     output: str,
     parts: Sequence[_Part],
     costs: Mapping[str, float],
-    counted_frames: Counter[str],
-) -> int:
+) -> None:
+    """Write the table, and say what is in it and how to learn from it."""
     from fuzzytree.report import counted
     from fuzzytree.tactile.features.names import feature_of, has_unit
     from fuzzytree.tactile.runtimes.frames import FramePlan
@@ -192,29 +188,24 @@ def _table(
     content = _csv(parts, found).encode()
     if output == "-":
         answer_bytes(content)
-        return 0
+        return
     write_atomically(output, content)
     known, sensor = parts[0].columns, parts[0].sensor
     counts = [len(part.frames) for part in parts]
-    full, several = counted_frames["saturated"], counted_frames["several"]
+    full = sum(part.saturated for part in parts)
+    several = sum(part.several for part in parts)
     none = sum(int((~part.is_pressed).sum()) for part in found)
     size = f"{sensor.rows} x {sensor.columns} cells"
     rows = [
         ("read", source, f"{counted(count, 'frame')} of {size}")
         for source, count in zip(options.frames, counts, strict=True)
     ]
-    if none:
-        rows.append(("left out", counted(none, "frame"), "nothing presses"))
-    if full:
-        rows.append(("full", counted(full, "frame"), "a cell takes no more"))
-    if several:
-        text = "several objects: the one of the largest force counts"
-        rows.append(("several", counted(several, "frame"), text))
-    placed = _placed(parts, found)
-    for name, count in placed.items():
-        if count < FEW_PLACEMENTS:
-            text = f"below {FEW_PLACEMENTS}, `live` finds more of its presses unknown"
-            rows.append(("few", name, f"{counted(count, 'placement')}: {text}"))
+    noticed = (
+        ("left out", none, "nothing presses"),
+        ("full", full, "a cell takes no more"),
+        ("several", several, "several objects: the one of the largest force counts"),
+    )
+    rows += [(word, counted(n, "frame"), text) for word, n, text in noticed if n]
     after = ["fuzzytree", "learn", output, "--target", CLASS, "-o", "tree.yaml"]
     groups = next((one for one in (SUBJECT, PLACEMENT) if one in known), "")
     after += ["--groups", groups] if groups else []
@@ -225,19 +216,10 @@ def _table(
     rows.append(("wrote", output, f"{counted(len(names), 'feature')}; {text}"))
     say_rows(*rows, quiet=options.quiet)
     if options.as_json:
-        answer_json(
-            {
-                "file": output,
-                "frames": sum(counts),
-                "nothing": none,
-                "placements": placed,
-                "saturated": full,
-                "several": several,
-                "features": names,
-                "costs": costs,
-            }
-        )
-    return 0
+        facts: dict[str, object] = {"file": output, "frames": sum(counts)}
+        facts |= {"nothing": none, "placements": _placed(parts, found)}
+        facts |= {"saturated": full, "several": several}
+        answer_json({**facts, "features": names, "costs": costs})
 
 
 def _placed(parts: Sequence[_Part], found: Sequence[Features]) -> Counter[str]:

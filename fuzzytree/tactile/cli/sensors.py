@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -15,9 +14,6 @@ if TYPE_CHECKING:
     from fuzzytree.model import Model
     from fuzzytree.tactile.boards import Board
     from fuzzytree.tactile.sensor import Cells, Sensor
-
-_SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
-
 
 data_option = option("--data FRAMES", "Frames to check with, beside generated ones.")
 
@@ -42,7 +38,19 @@ class FramesOptions(ResultOptions):
 class SensorOptions(FramesOptions):
     """The options that say which sensor it is."""
 
-    size: str | None = option("--sensor 16x16", "Rows and columns of the sensor.")
+    sensor: str | None = option("--sensor 16x16", "Rows and columns of the sensor.")
+
+
+def board_of_options(options: FramesOptions) -> Board | None:
+    """Return the board of `--board`, if there is one; refuse what contradicts it."""
+    from fuzzytree.tactile.board_file import load_board
+
+    if options.board is None:
+        return None
+    for name in ("sensor", "full", "threshold"):
+        if getattr(options, name, None) is not None:
+            raise click.UsageError(f"--board sets --{name}; choose one of them")
+    return load_board(options.board)
 
 
 def sensor_of_options(options: SensorOptions) -> Sensor:
@@ -54,34 +62,22 @@ def sensor_of_options(options: SensorOptions) -> Sensor:
     """
     from fuzzytree.tactile.sensor import Sensor
 
-    if options.board is not None:
-        others = (options.size, options.full, options.threshold)
-        known = board_of_option(options.board, "--sensor, --full and", others)
-        if known.calibration is not None:
+    if board := board_of_options(options):
+        if board.calibration is not None:
             text = "a file from frame to class takes readings; name a board without one"
             raise click.UsageError(f"{options.board} is calibrated, and {text}")
-        return known.sensor
-    if options.size is None:
+        return board.sensor
+    if options.sensor is None:
         raise click.UsageError(
             "name the board with --board, or its size: --sensor 16x16"
         )
-    found = _SIZE.fullmatch(options.size)
+    found = re.fullmatch(r"(\d{1,3})x(\d{1,3})", options.sensor)
     if found is None:
         text = "rows and columns are as in 16x16"
-        raise click.UsageError(f"--sensor {options.size}: {text}")
-    rows, columns = map(int, found.groups())
+        raise click.UsageError(f"--sensor {options.sensor}: {text}")
     full = 255 if options.full is None else options.full
     with wrong_options():
-        return Sensor(rows, columns, full, options.threshold or 0)
-
-
-def board_of_option(name: str, names: str, others: Sequence[object]) -> Board:
-    """Return the board of `--board`; refuse options that contradict it."""
-    from fuzzytree.tactile.board_file import load_board
-
-    if any(one is not None for one in others):
-        raise click.UsageError(f"--board sets {names} --threshold; choose one of them")
-    return load_board(name)
+        return Sensor(int(found[1]), int(found[2]), full, options.threshold or 0)
 
 
 def frames_of_file(
@@ -111,11 +107,7 @@ def frames_of_file(
 
 
 def frames_model(path: str) -> Model:
-    """Return the model of a file, which must be a tree or a rule base.
-
-    Raises:
-        TableError: If the file holds something else.
-    """
+    """Return the model of a file, which must be a tree or a rule base."""
     from fuzzytree import api
     from fuzzytree.tactile.recognition.recogniser import checked_model
 

@@ -102,8 +102,8 @@ def test_nothing_is_written_where_a_way_disagrees(
         (["pad.c"], "name the board with --board, or its size: --sensor 16x16"),
         (["pad.c", "--sensor", "6by4"], "--sensor 6by4: rows and columns are as in "
          "16x16"),
-        (["pad.c", "--board", "b.yaml", "--full", "9"], "--board sets --sensor, "
-         "--full and --threshold; choose one of them"),
+        (["pad.c", "--board", "b.yaml", "--full", "9"], "--board sets --full; "
+         "choose one of them"),
         (["pad.c", *SIZE, "--threshold", "100"], "the threshold lies in 0 to full - 1, "
          "not 100"),
         (["pad.c", *SIZE, "--set", "name"], "--set name: must be NAME=VALUE"),
