@@ -199,9 +199,8 @@ def _words(answer: LiveResult) -> list[str]:
 
     if answer.state is None:
         return ["refused"]
-    if not answer.objects:
-        return [STATES[answer.state]]
-    return [one.label or STATES[one.state] for one in answer.objects]
+    found = [one.label or STATES[one.state] for one in answer.objects]
+    return found or [STATES[answer.state]]
 
 
 def _report(

@@ -8,7 +8,8 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Generator, Mapping
+from collections.abc import Generator
+from itertools import zip_longest
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 if sys.platform != "win32":
     import termios
+    import tty
 
 COUNTS = (3, 5, 7)
 """Points of the picture for a cell on each side, as a key switches them."""
@@ -32,23 +34,15 @@ _LEAVE = "\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l"
 _MANY = ("xterm", "screen", "tmux", "rxvt", "linux", "256color")
 
 
-def look_of(
-    stream: TextIO, environment: Mapping[str, str] | None = None
-) -> Look | None:
-    """Return how a stream shows pictures; None if it is no terminal that does.
-
-    Args:
-        stream: Where the picture would go.
-        environment: Its TERM, COLORTERM and NO_COLOR; those of the process if None.
-    """
-    known = os.environ if environment is None else environment
-    term = known.get("TERM", "")
+def look_of(stream: TextIO) -> Look | None:
+    """Return how a stream shows pictures; None if it is no terminal that does."""
+    term = os.environ.get("TERM", "")
     if not stream.isatty() or term in ("", "dumb"):
         return None
     encoding = (stream.encoding or "").lower().replace("-", "")
-    if known.get("NO_COLOR") or encoding != "utf8":
+    if os.environ.get("NO_COLOR") or encoding != "utf8":
         return "plain"
-    if known.get("COLORTERM") in ("truecolor", "24bit"):
+    if os.environ.get("COLORTERM") in ("truecolor", "24bit"):
         return "full"
     return "256" if any(name in term for name in _MANY) else "plain"
 
@@ -62,8 +56,7 @@ class Screen:
     def __init__(self, live: Live, stream: TextIO, look: Look, times: int) -> None:
         self._live, self._file = live, stream.fileno()
         self._look: Look = look
-        self._times = times
-        self._is_smooth = True
+        self._times, self._is_smooth = times, True
         self._keyboard: int | None = None
         self._settings: list[Any] = []
         self._stop = threading.Event()
@@ -74,8 +67,7 @@ class Screen:
 
     def __enter__(self) -> Screen:
         """Take the terminal."""
-        self._listen()
-        self._write(_ENTER)
+        self._take()
         self._thread.start()
         return self
 
@@ -83,37 +75,31 @@ class Screen:
         """Give the terminal back, with its cursor."""
         self._stop.set()
         self._thread.join(_JOIN_S)
-        with contextlib.suppress(OSError):  # the terminal may be gone
-            self._write(_LEAVE)
-        self._listen_no_more()
+        self._give_back()
 
     @contextlib.contextmanager
     def given_back(self) -> Generator[None]:
         """Give the terminal back for a while, and take it again."""
         with self._drawing:
-            self._write(_LEAVE)
-            self._listen_no_more()
+            self._give_back()
             yield
-            self._listen()
-            self._write(_ENTER)
-            self._shown = []
+            self._take()
 
-    def _listen(self) -> None:
-        """Take keys as they are pressed, without showing them."""
-        if sys.platform == "win32" or not sys.stdin.isatty():
-            return
-        keyboard = sys.stdin.fileno()
-        self._settings = termios.tcgetattr(keyboard)
-        new = termios.tcgetattr(keyboard)
-        new[3] &= ~(termios.ICANON | termios.ECHO)
-        termios.tcsetattr(keyboard, termios.TCSANOW, new)
-        self._keyboard = keyboard
+    def _take(self) -> None:
+        """Take the screen, and keys as they are pressed, without showing them."""
+        if sys.platform != "win32" and sys.stdin.isatty():
+            self._keyboard = sys.stdin.fileno()
+            self._settings = termios.tcgetattr(self._keyboard)
+            tty.setcbreak(self._keyboard, termios.TCSANOW)
+        self._write(_ENTER)
+        self._shown = []
 
-    def _listen_no_more(self) -> None:
+    def _give_back(self) -> None:
+        with contextlib.suppress(OSError):  # the terminal may be gone
+            self._write(_LEAVE)
         if sys.platform != "win32" and self._keyboard is not None:
-            with contextlib.suppress(termios.error):  # the terminal may be gone
+            with contextlib.suppress(termios.error):
                 termios.tcsetattr(self._keyboard, termios.TCSANOW, self._settings)
-            self._keyboard = None
 
     def _take_keys(self) -> None:
         if self._keyboard is None or not select.select([self._keyboard], [], [], 0)[0]:
@@ -151,13 +137,13 @@ class Screen:
         if self._keyboard is None:
             keys = "Ctrl-C ends"
         text = screen(view, columns, lines, look=self._look, times=times, keys=keys)
-        new = text.split("\n")
-        parts = ["\x1b[2J"] if size != self._size else []
-        before = [] if size != self._size else self._shown
-        for place in range(max(len(new), len(before))):
-            line = new[place] if place < len(new) else ""
-            if place >= len(before) or before[place] != line:
-                parts.append(f"\x1b[{place + 1};1H{line}\x1b[K")
+        new, parts = text.split("\n"), []
+        if size != self._size:
+            self._shown, parts = [], ["\x1b[2J"]
+        pairs = zip_longest(new, self._shown, fillvalue="")
+        for number, (line, before) in enumerate(pairs, 1):
+            if line != before:
+                parts.append(f"\x1b[{number};1H{line}\x1b[K")
         if parts:
             self._write("".join(parts))
         self._shown, self._size = new, size

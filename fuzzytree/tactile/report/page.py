@@ -120,30 +120,22 @@ class LivePage(ThreadingHTTPServer):
         self.server_close()
         self._thread.join()
 
-    def process_request(
-        self, request: socket.socket | tuple[bytes, socket.socket], client_address: Any
-    ) -> None:
-        """Serve a connection in a thread, if there are not too many."""
-        if self._room.acquire(blocking=False):
-            super().process_request(request, client_address)
-            return
-        assert isinstance(request, socket.socket)  # of a server of streams
-        with contextlib.suppress(OSError):
-            request.sendall(b"HTTP/1.0 503 too many browsers\r\n\r\n")
-        self.shutdown_request(request)
+    def verify_request(self, request: Any, client_address: Any) -> bool:
+        """Turn a browser away if there are too many."""
+        is_free = self._room.acquire(blocking=False)
+        if not is_free:
+            with contextlib.suppress(OSError):
+                request.sendall(b"HTTP/1.0 503 too many browsers\r\n\r\n")
+        return is_free
 
-    def process_request_thread(
-        self, request: socket.socket | tuple[bytes, socket.socket], client_address: Any
-    ) -> None:
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
         """Serve a connection, then make room for another."""
         try:
             super().process_request_thread(request, client_address)
         finally:
             self._room.release()
 
-    def handle_error(
-        self, request: socket.socket | tuple[bytes, socket.socket], client_address: Any
-    ) -> None:
+    def handle_error(self, request: Any, client_address: Any) -> None:
         """Let a browser go away at any time."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)

@@ -278,12 +278,15 @@ def test_a_board_that_contradicts_the_stream_ends_live_with_a_sentence(
     assert "no frame" in err.splitlines()[-1]
 
 
-def look(**environment: str) -> str | None:
-    stream = SimpleNamespace(isatty=lambda: True, encoding="utf-8")
-    return look_of(stream, environment)  # type: ignore[arg-type] # all that is asked
+def test_the_terminal_says_which_colours_it_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def look(**environment: str) -> str | None:
+        for name in ("TERM", "COLORTERM", "NO_COLOR"):
+            monkeypatch.setenv(name, environment.get(name, ""))
+        stream = SimpleNamespace(isatty=lambda: True, encoding="utf-8")
+        return look_of(stream)  # type: ignore[arg-type] # all that is read
 
-
-def test_the_terminal_says_which_colours_it_has() -> None:
     assert look(TERM="xterm-256color", COLORTERM="truecolor") == "full"
     assert look(TERM="xterm-256color") == "256"
     assert look(TERM="vt100") == "plain"
