@@ -8,18 +8,14 @@ import click
 
 from fuzzytree.cli import Verbs
 
-ACTIONS = (
-    *("ports", "record", "replay", "calibrate", "live"),
-    *("features", "export", "check"),
-)
-"""Each action is the `command` of the module `fuzzytree.tactile.cli.ACTION`."""
+_ACTIONS = "ports record replay calibrate live features export check"
 
 
 class Actions(Verbs):
     """The actions, in the order in which one needs them."""
 
     modules = MappingProxyType(
-        {name: f"fuzzytree.tactile.cli.{name}" for name in ACTIONS}
+        {name: f"fuzzytree.tactile.cli.{name}" for name in _ACTIONS.split()}
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import click
@@ -93,11 +94,9 @@ def _readings(path: str, board: Board) -> FloatArray:
     from fuzzytree.tactile.sensor import pressed
 
     found = read_recording(path)
-    own, other = board.sensor, found.board.sensor
-    is_alike = (own.rows, own.columns, own.full) == (
-        *(other.rows, other.columns, other.full),
-    )
-    if not is_alike or found.board.protocol != board.protocol:
+    other = found.board.sensor
+    size = attrgetter("rows", "columns", "full")
+    if size(other) != size(board.sensor) or found.board.protocol != board.protocol:
         raise ReadError(f"{path}: is a recording of another board, {found.board.name}")
     if not len(found.frames):
         raise ReadError(f"{path}: holds no frame, so the load has nothing to show")

@@ -133,8 +133,7 @@ def command(options: TactileLiveOptions) -> int:
         live = sensor.live
         if options.page is not None:
             page = LivePage(live, options.page, times=options.times)
-            url = stack.enter_context(page).url
-            say_rows(("serves", url, ""), quiet=options.quiet)
+            tell("serves", stack.enter_context(page).url)
         try:
             with _display(live, options) as write:
                 for answer in live.answers(options.frames):
@@ -145,10 +144,9 @@ def command(options: TactileLiveOptions) -> int:
             pass
     _report(live, labels, frames, options)
     recorded = sensor.recorded
-    if recorded is None or options.record is None:
+    if recorded is None:
         return 0
-    kept = f"{recorded.written} frames"
-    say_rows(("wrote", options.record, kept), quiet=options.quiet)
+    tell("wrote", f"{options.record} {recorded.written} frames")
     if recorded.failure:
         say(recorded.failure)
     return 1 if recorded.failure else 0
@@ -204,10 +202,7 @@ def _words(answer: LiveResult) -> list[str]:
 
 
 def _report(
-    live: Live,
-    labels: Counter[str],
-    frames: int,
-    options: TactileLiveOptions,
+    live: Live, labels: Counter[str], frames: int, options: TactileLiveOptions
 ) -> None:
     """Say what was answered, how fast, and what was out of the ordinary."""
     from fuzzytree.tactile.recognition.live import STATES
@@ -217,11 +212,10 @@ def _report(
     view, word = live.view(), STATES[State.UNKNOWN]
     found = [f"{printable(label)} {count}" for label, count in sorted(labels.items())]
     unknown = labels[word]
-    floor = (
-        f"no rule, or one below {live.recogniser.reject:g}, decides; --reject sets it"
-    )
+    reject = live.recogniser.reject
+    floor = f"no rule, or one below {reject:g}, decides; --reject sets it"
     if options.vote:
-        floor = f"{floor}; or the vote was not over"
+        floor += "; or the vote was not over"
     small = f"regions below {options.area} cells, no objects; --area sets it"
     say_rows(
         ("answered", f"{frames} frames", ", ".join(found)),

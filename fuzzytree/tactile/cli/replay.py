@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterator
 from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
@@ -21,6 +20,7 @@ from fuzzytree.cli import (
     takes,
 )
 from fuzzytree.files import check_places
+from fuzzytree.model import printable
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.link.recording import FrameFile, Review
@@ -100,9 +100,7 @@ def _lines(name: str, file: FrameFile, found: Review) -> Iterator[str]:
     board, sensor = file.board, file.board.sensor
     family = type(board.protocol).__name__.lower()
     size = f"{sensor.rows} x {sensor.columns} cells, full {sensor.full}"
-    # A recording may come from anywhere, and a name may hold commands for a terminal.
-    shown = board.name if board.name.isprintable() else repr(board.name)
-    yield f"{name}: {shown}, {size}, {family}, {board.port.baud} baud"
+    yield f"{name}: {printable(board.name)}, {size}, {family}, {board.port.baud} baud"
     seconds = found.seconds
     rate = f", {(found.frames - 1) / seconds:.1f} a second" if seconds > 0 else ""
     frames = counted(found.frames, "frame")
@@ -129,7 +127,5 @@ def _started(file: FrameFile) -> str | None:
     """Return when a recording began; None if that is not known."""
     if not file.started_ns:
         return None
-    begin = datetime(1970, 1, 1, tzinfo=UTC)
-    with contextlib.suppress(OverflowError):
-        begin += timedelta(microseconds=file.started_ns // 1000)
-    return begin.isoformat(timespec="milliseconds")
+    past = timedelta(microseconds=file.started_ns // 1000)
+    return (datetime(1970, 1, 1, tzinfo=UTC) + past).isoformat(timespec="milliseconds")

@@ -133,9 +133,8 @@ class Screen:
         view = self._live.view()
         times = self._times if self._is_smooth else 1
         shown = f"{self._times} points a cell" if self._is_smooth else "the real cells"
-        keys = f"t tares, s and i change the picture ({shown}), Ctrl-C ends"
-        if self._keyboard is None:
-            keys = "Ctrl-C ends"
+        keys = f"t tares, s and i change the picture ({shown}), "
+        keys = "" if self._keyboard is None else keys
         text = screen(view, columns, lines, look=self._look, times=times, keys=keys)
         new, parts = text.split("\n"), []
         if size != self._size:
@@ -161,14 +160,12 @@ def ended_by_signals(shown: Screen | None) -> Generator[None]:
     When it is stopped (Ctrl-Z), the terminal is given back until it goes on.
     """
 
-    def end(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
     def stop(number: int, frame: FrameType | None) -> None:
         if shown is not None:
             with shown.given_back():
                 os.kill(os.getpid(), signal.SIGSTOP)
 
+    end = signal.default_int_handler  # raises KeyboardInterrupt
     wanted: dict[str, Handler] = {"SIGTERM": end, "SIGHUP": end}
     if shown is not None:
         wanted["SIGTSTP"] = stop

@@ -189,15 +189,12 @@ def timing(view: LiveView) -> str:
 
 
 def screen(
-    view: LiveView,
-    columns: int,
-    lines: int,
-    *,
-    look: Look,
-    times: int,
-    keys: str = "Ctrl-C ends",
+    view: LiveView, columns: int, lines: int, *, look: Look, times: int, keys: str = ""
 ) -> str:
-    """Return a whole screen: at most `lines` lines of at most `columns` signs."""
+    """Return a whole screen: at most `lines` lines of at most `columns` signs.
+
+    Its last line says what is wrong, or what `keys` do.
+    """
     room = max(lines - 5, 1)  # beside the title and the last lines
     is_wide = columns >= 2 * _SIDE
     beside = _SIDE if is_wide else 0
@@ -223,7 +220,7 @@ def screen(
         return _styled(_cut(text, columns), code, look)
 
     foot = [line(counts(view), _DIM), line(timing(view), _DIM)]
-    foot.append(line(wrong or keys, _BOLD if wrong else _DIM))
+    foot.append(line(wrong or f"{keys}Ctrl-C ends", _BOLD if wrong else _DIM))
     return "\n".join([line(title, _BOLD), *body[:room], "", *foot][:lines])
 
 

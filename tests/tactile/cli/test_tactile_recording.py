@@ -263,11 +263,11 @@ def test_an_empty_recording_is_reported(call: Call, place: Path) -> None:
     assert "frames    0 frames in 0.0 s; begun 2262-04-11" in out
 
 
-def test_a_name_that_commands_the_terminal_is_quoted(call: Call, place: Path) -> None:
+def test_a_name_that_commands_the_terminal_is_escaped(call: Call, place: Path) -> None:
     board = Board("mat\x1b[2J\n", Sensor(1, 1), Marker("AA 55"))
     Recorder("b.ftr", board).close()
     _, out, _ = call("tactile", "replay", "b.ftr")
-    assert out.startswith("b.ftr: 'mat\\x1b[2J\\n', 1 x 1 cells")
+    assert out.startswith("b.ftr: mat\\x1b[2J\\n, 1 x 1 cells")
 
 
 def test_frames_become_a_table(call: Call, place: Path) -> None:
