@@ -32,10 +32,8 @@ Look = Literal["full", "256", "plain"]
 SILENT_S = 1.0
 """After how long without a frame a display says so."""
 
-_EIGHTHS = " ▏▎▍▌▋▊▉"
 _BOLD, _DIM = "1", "2"
 _NAME = 18  # the widest column of classes
-_BAR = 150  # the shade of a bar: it can be seen on white and on black
 _LEAST_LEGEND = 4  # signs of colours
 _SIDE = 34  # columns beside a picture
 
@@ -248,24 +246,18 @@ def _facts(view: LiveView, lines: int, look: Look) -> list[str]:
     largest = sorted(range(count), key=lambda place: -strengths[place])[:most]
     names = [printable(name) for name in view.classes]
     width = min(max(map(cell_len, names)), _NAME)
+    # A shade that can be seen on white and on black.
+    colour = "" if look == "plain" else f"38;{_CODES[look][150]}"
     for place in sorted(largest):  # in the order of the classes
         name, own = set_cell_size(names[place], width), strengths[place]
         text = f"{name} {own:4.2f} "
         if place == first.code:
             text = _styled(text, _BOLD, look)
-        found.append(text + _bar(own, _SIDE - 9 - width, look))
+        bar = ("#" if look == "plain" else "█") * round(own * (_SIDE - 9 - width))
+        found.append(text + _styled(bar, colour, look))
     if most < count and room:
         found.append(f"and {count - most} weaker ones")
     return found
-
-
-def _bar(share: float, width: int, look: Look) -> str:
-    """Return a bar of so many signs for a share of 1."""
-    if look == "plain":
-        return "#" * round(share * width)
-    whole, part = divmod(round(share * width * 8), 8)
-    bar = "█" * whole + _EIGHTHS[part].strip()
-    return _styled(bar, f"38;{_CODES[look][_BAR]}", look)
 
 
 def _styled(text: str, code: str, look: Look) -> str:
