@@ -34,16 +34,13 @@ if TYPE_CHECKING:
 USUAL = "log orientation / force,log area"
 """Features that depend little on the force of a press and on the gain of the sensor."""
 
-CLASS = "class"
-"""The column of the classes."""
-
-SUBJECT = "subject"
+CLASS, SUBJECT = "class", "subject"
 
 PLACEMENT = "placement"
 """The column of the placements, from 1, of frames that follow each other."""
 
-
 _ALIKE = {SUBJECT: "states subjects", PLACEMENT: "is a recording"}
+"""The columns that all files have or none, and what a file does that has them."""
 
 
 class TactileFeaturesOptions(FramesOptions):
