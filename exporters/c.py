@@ -146,6 +146,7 @@ def write_c(
     name: str | None = None,
     activations: bool = False,
     probabilities: bool = False,
+    selftest: bool = True,
 ) -> Written:
     """Return a model as the text of a C file, in ASCII.
 
@@ -162,6 +163,8 @@ def write_c(
             stands behind the outputs.
         probabilities: Of a rule base that has them: whether the file also offers
             `NAME_probabilities(answer, strengths, probabilities)`.
+        selftest: Whether the file also holds a program that tests it, which is what
+            takes most of the time to write.
 
     Raises:
         LossError: If float32 cannot represent a number of the model, unless allowed.
@@ -181,7 +184,8 @@ def write_c(
     if isinstance(model, FuzzySystem):
         if dtype != "float64":
             raise ValueError("fuzzy systems are written in float64 only")
-        body = "".join(_system_text(model, activations=activations))
+        parts = _system_text(model, activations=activations, selftest=selftest)
+        body = "".join(parts)
         text = "".join(_heading(model)) + fill(body, prefix)
         return Written(text.encode("ascii"))
     if activations:
@@ -190,7 +194,7 @@ def write_c(
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, "c float32", lost)
     code = CFile(model, _NUMBERS[dtype], prefix, probabilities=probabilities)
-    return Written("".join(code.text()).encode("ascii"), lost)
+    return Written("".join(code.text(selftest=selftest)).encode("ascii"), lost)
 
 
 def beginning(own: str, name: str | None) -> str:
@@ -207,7 +211,9 @@ def beginning(own: str, name: str | None) -> str:
     return prefix
 
 
-def _system_text(system: FuzzySystem, *, activations: bool) -> Iterator[str]:
+def _system_text(
+    system: FuzzySystem, *, activations: bool, selftest: bool
+) -> Iterator[str]:
     """Yield what stands behind the heading of a system."""
     yield _USE + _DECLARE
     yield "typedef double name_real;\n\n"
@@ -217,7 +223,8 @@ def _system_text(system: FuzzySystem, *, activations: bool) -> Iterator[str]:
     yield SYSTEM_TYPES + _DEFINE
     yield _checks(DOUBLE, is_arithmetic=True)
     yield from system_code(system, activations=activations)
-    yield from system_selftest(system, activations=activations)
+    if selftest:
+        yield from system_selftest(system, activations=activations)
     yield "\n#endif\n"
 
 
@@ -251,12 +258,13 @@ class CFile(CModel):
         self.prefix = prefix
         self.probabilities = probabilities
 
-    def text(self) -> Iterator[str]:
+    def text(self, *, selftest: bool) -> Iterator[str]:
         """Yield the file."""
         mixed = any(variable.parts for variable in self.model.variables)
         yield from self.declarations()
         yield from self.definitions(is_arithmetic=mixed or self.tables is not None)
-        yield from map(self._fill, selftest_code(self))
+        if selftest:
+            yield from map(self._fill, selftest_code(self))
         yield "\n#endif\n"
 
     def declarations(self) -> Iterator[str]:

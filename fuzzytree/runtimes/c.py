@@ -104,11 +104,11 @@ def load(model: Model, dtype: Dtype = "float64", *, has_strengths: bool = True) 
         FuzzyTreeError: If the compiler fails.
     """
     try:
-        content = write_c(model, dtype=dtype, name="model").content
+        written = write_c(model, dtype=dtype, name="model", selftest=False)
     except LossError as error:
         text = str(error).replace("cannot write", "cannot run", 1)
         raise LossError(text.partition("\n  pass allow_loss")[0]) from error
-    return load_content(content, model, dtype, has_strengths=has_strengths)
+    return load_content(written.content, model, dtype, has_strengths=has_strengths)
 
 
 def load_content(
@@ -166,7 +166,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
         MissingExtraError: If no compiler is installed.
         FuzzyTreeError: If the compiler fails.
     """
-    file = write_c(system, name="model", activations=activations)
+    file = write_c(system, name="model", activations=activations, selftest=False)
     speed = "-O0" if len(file.content) > _LONG else "-O2"
     infer = compiled(file.content, _INFER_LOOP, 2, speed)
     outputs = len(system.outputs)

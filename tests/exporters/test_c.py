@@ -188,3 +188,12 @@ def test_wrong_options_are_named() -> None:
 def test_the_format_carries_all_models() -> None:
     assert FORMAT.carries == ("tree", "rules", "system")
     assert FORMAT.read is None
+
+
+def test_a_file_without_its_test_is_the_same_up_to_there() -> None:
+    tree = random_tree(3)
+    for model in (tree, rules_from_tree(tree), random_system(1)):
+        whole = write_c(model, name="m").content
+        bare = write_c(model, name="m", selftest=False).content
+        begin, _, _ = whole.partition(b"\n#ifdef M_SELFTEST")
+        assert bare == begin + b"\n#endif\n"
