@@ -88,9 +88,10 @@ class Screen:
     def _take(self) -> None:
         """Take the screen, and keys as they are pressed, without showing them."""
         if sys.platform != "win32" and sys.stdin.isatty():
-            self._keyboard = sys.stdin.fileno()
-            self._settings = termios.tcgetattr(self._keyboard)
-            tty.setcbreak(self._keyboard, termios.TCSANOW)
+            keyboard = sys.stdin.fileno()
+            self._settings = termios.tcgetattr(keyboard)
+            tty.setcbreak(keyboard, termios.TCSANOW)
+            self._keyboard = keyboard
         self._write(_ENTER)
         self._shown = []
 
