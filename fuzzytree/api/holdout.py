@@ -22,7 +22,7 @@ from fuzzytree.learning import (
     class_weights,
     learn_arrays,
 )
-from fuzzytree.model import USUAL_FLOOR, FloatArray, FuzzyTree, IntArray
+from fuzzytree.model import USUAL_FLOOR, BoolArray, FloatArray, FuzzyTree, IntArray
 from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import rules_from_tree
 from fuzzytree.tables import Table
@@ -179,7 +179,7 @@ def accuracy(
         )
         fold = folds_of(codes[first], folds, seed)[group]
     shares: list[float] = []
-    strengths: list[float] = []
+    weak: list[BoolArray] = []
     weights = _weights(table, settings)
     most = min(_CLASSES // len(table.classes), _COLUMNS // width)
     tried = max(1, min(folds, most))
@@ -202,16 +202,17 @@ def accuracy(
             categories=table.categories,
             weights=None if table.row_weights is None else table.row_weights[kept],
         )
-        rules, predicted = _answered(learnt.tree, table, test)
+        values = _values(learnt.tree, table, test)
+        rules, predicted = _answered(learnt.tree, table, values)
         if groups is not None and learnt.tree.sets:
-            strengths += _strengths(learnt.tree, table, test, rules)
+            weak.append(_is_weak(learnt.tree, values, rules))
         right = predicted == table.codes[test]
         weight = None if weights is None else weights[test]
         shares.append(float(np.average(right, weights=weight)))
     if not shares:
         return None
-    weak = float(np.mean(np.array(strengths) < USUAL_FLOOR)) if strengths else None
-    return Accuracy(tuple(shares), len(rows), table.rows, weak)
+    share = float(np.concatenate(weak).mean()) if weak else None
+    return Accuracy(tuple(shares), len(rows), table.rows, share)
 
 
 def grouped(table: Table, column: str) -> tuple[Table, IntArray]:
@@ -319,23 +320,19 @@ def _values(tree: FuzzyTree, table: Table, rows: IntArray) -> FloatArray:
 
 
 def _answered(
-    tree: FuzzyTree, table: Table, rows: IntArray
+    tree: FuzzyTree, table: Table, values: FloatArray
 ) -> tuple[IntArray, IntArray]:
     """Return the leaf of each row, and the code of its class; 0 and -1 for none."""
     code = {label: k for k, label in enumerate(table.classes)}
     ends = np.array([-1, *(code[leaf.label] for leaf in tree.leaves)], np.int64)
-    found = baseline().load(tree)(_values(tree, table, rows)).rule
+    found = baseline().load(tree)(values).rule
     return found, ends[found]
 
 
-def _strengths(
-    tree: FuzzyTree, table: Table, rows: IntArray, rules: IntArray
-) -> list[float]:
-    """Return what the raw rules have that decide for some rows."""
-    run = baseline().load(rules_from_tree(tree, "raw"))
-    found = run(_values(tree, table, rows)).strengths
-    if found is None:  # rules that are fired have strengths
-        raise TypeError(f"{tree.name}: no strengths")
-    own = found[np.maximum(rules - 1, 0), np.arange(len(rules))]
-    strengths: list[float] = np.where(rules > 0, np.nan_to_num(own), 0.0).tolist()
-    return strengths
+def _is_weak(tree: FuzzyTree, values: FloatArray, rules: IntArray) -> BoolArray:
+    """Return for which rows the raw rule that decides is below the usual floor."""
+    strengths = baseline().load(rules_from_tree(tree, "raw"))(values).strengths
+    assert strengths is not None  # rules that are fired have them
+    own = strengths[np.maximum(rules - 1, 0), np.arange(len(rules))]
+    weak: BoolArray = (rules == 0) | ~(own >= USUAL_FLOOR)  # NaN, missing, is weak
+    return weak

@@ -277,8 +277,10 @@ def _with_floor(learnt: Learnt, floor: float) -> Learnt:
 
 def _floor_row(tested: Accuracy) -> tuple[str, str, str]:
     """Return a line about the floor of strengths, and why it is that one."""
+    from fuzzytree.model import USUAL_FLOOR
+
     weak = 100 * (tested.weak or 0.0)
-    text = f"0.001 rejects {weak:.1f} % of the rows left out"
+    text = f"{USUAL_FLOOR:g} rejects {weak:.1f} % of the rows left out"
     return "floor", f"{tested.floor:g}", f"{text}; below it a row is unknown"
 
 
