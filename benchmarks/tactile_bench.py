@@ -28,10 +28,10 @@ from fuzzytree.report.bench import machine_rows
 from fuzzytree.report.text import aligned, duration
 from fuzzytree.tactile.cli.sensors import (
     SensorOptions,
-    frames_model,
     frames_of_file,
     sensor_of_options,
 )
+from fuzzytree.tactile.recognition.recogniser import frames_model
 
 
 class TactileBenchOptions(SensorOptions):

@@ -19,7 +19,6 @@ from fuzzytree.cli import (
 from fuzzytree.tactile.cli.sensors import (
     SensorOptions,
     data_option,
-    frames_model,
     sensor_of_options,
 )
 
@@ -51,6 +50,7 @@ def command(options: TactileCheckOptions) -> int:
     from fuzzytree.report import agreement_lines, agreement_verdict
     from fuzzytree.tactile.presses import read_frames
     from fuzzytree.tactile.recognition.checking import check_frames
+    from fuzzytree.tactile.recognition.recogniser import frames_model
 
     settings = (options.board, options.sensor, options.full, options.threshold)
     is_named = any(one is not None for one in settings)

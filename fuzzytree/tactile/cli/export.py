@@ -27,7 +27,6 @@ from fuzzytree.files import check_place, write_atomically
 from fuzzytree.tactile.cli.sensors import (
     SensorOptions,
     data_option,
-    frames_model,
     frames_of_file,
     sensor_of_options,
 )
@@ -66,7 +65,12 @@ def command(options: TactileExportOptions) -> int:
     from fuzzytree.tactile.exporters import onnx_frames
     from fuzzytree.tactile.exporters.c_frames import write_frames_c
     from fuzzytree.tactile.recognition.checking import check_frames
-    from fuzzytree.tactile.recognition.recogniser import Recogniser, State, check_inputs
+    from fuzzytree.tactile.recognition.recogniser import (
+        Recogniser,
+        State,
+        check_inputs,
+        frames_model,
+    )
     from fuzzytree.tactile.sensor import saturated
 
     form = options.to or Path(options.output).suffix.lower()[1:]

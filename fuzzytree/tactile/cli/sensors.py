@@ -11,7 +11,6 @@ from fuzzytree.cli import ResultOptions, option, say_rows, wrong_options
 from fuzzytree.errors import ReadError, TableError
 
 if TYPE_CHECKING:
-    from fuzzytree.model import Model
     from fuzzytree.tactile.boards import Board
     from fuzzytree.tactile.sensor import Cells, Sensor
 
@@ -104,11 +103,3 @@ def frames_of_file(
         return check_frames(sensor, found.frames)
     except TableError as error:
         raise ReadError(f"{path}: {error}") from error
-
-
-def frames_model(path: str) -> Model:
-    """Return the model of a file, which must be a tree or a rule base."""
-    from fuzzytree import api
-    from fuzzytree.tactile.recognition.recogniser import checked_model
-
-    return checked_model(api.opened(path), path)

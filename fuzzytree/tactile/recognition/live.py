@@ -7,7 +7,7 @@ import itertools
 import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -269,7 +269,7 @@ class Live:
         self._latencies: deque[float] = deque(maxlen=_KEPT)
         self._times: deque[float] = deque(maxlen=_RATED)
         self._largest = self._first = 0.0
-        self._counted = replace(source.counters)
+        self._counted = source.counters
         self._past: tuple[str, float] = "", -_SHOWN_S
 
     def tare(self) -> None:
@@ -393,7 +393,7 @@ class Live:
         time = answer.time
         self._first = self._first if self._number else time
         self._largest = max(self._largest, answer.latency_s)
-        counted = replace(self.source.counters)
+        counted = self.source.counters
         if counted.reconnects > self._counted.reconnects:
             self.rest.interrupt()
         if text := _failures(self._counted, counted):

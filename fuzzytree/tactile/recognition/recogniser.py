@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 
+from fuzzytree.api import opened
 from fuzzytree.errors import TableError
+from fuzzytree.files import PathLike
 from fuzzytree.model import (
     USUAL_FLOOR,
     FloatArray,
@@ -227,12 +230,14 @@ def check_inputs(model: Model, sensor: Sensor | None = None) -> None:
             raise TableError(f"{model.name}: {text}")
 
 
-def checked_model(model: object, name: str) -> Model:
-    """Return a model of frames: a tree or a rule base.
+def frames_model(path: PathLike) -> Model:
+    """Return the model of a file, which must be a tree or a rule base.
 
     Raises:
-        TableError: If it is something else; it begins with the name.
+        TableError: If it is something else; it begins with the path.
     """
+    model = opened(path)
     if not isinstance(model, FuzzyTree | RuleBase):
+        name = os.fspath(path)
         raise TableError(f"{name}: a model of frames is a tree or a rule base")
     return model

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from fuzzytree.api import opened
 from fuzzytree.model import FuzzyTree, RuleBase
 from fuzzytree.tactile.board_file import load_board
 from fuzzytree.tactile.boards import Board
@@ -18,7 +17,7 @@ from fuzzytree.tactile.presses import open_frames
 from fuzzytree.tactile.recognition.frame_sources import Recorded, Replayed
 from fuzzytree.tactile.recognition.live import Live, LiveResult
 from fuzzytree.tactile.recognition.objects import LEAST_AREA
-from fuzzytree.tactile.recognition.recogniser import checked_model, usual_floor
+from fuzzytree.tactile.recognition.recogniser import frames_model, usual_floor
 
 if TYPE_CHECKING:
     from fuzzytree.files import PathLike
@@ -152,13 +151,12 @@ def open(
         ((4, 6), ['bar'])
     """
     if not isinstance(model, FuzzyTree | RuleBase):
-        model = checked_model(opened(model), os.fspath(model))
+        model = frames_model(model)
     is_recorded = record is not None
     with contextlib.ExitStack() as stack:
         line, used, remarks = _source(
             stack, source, board, speed, say, is_recorded=is_recorded
         )
-        stack.callback(line.close)
         recorded: Recorded | None = None
         if record is not None:
             most = MOST_WAITING if isinstance(line, Connection) else 0
@@ -193,7 +191,9 @@ def _source(
     if Path(source).is_file():
         file = open_frames(source, known)
         stack.enter_context(file)
-        return Replayed(file, speed), file.board, []
+        replayed = Replayed(file, speed)
+        stack.callback(replayed.close)
+        return replayed, file.board, []
     if known is None:
         text = f"{source} is no recording; for a port, name its board"
         raise ValueError(text)
