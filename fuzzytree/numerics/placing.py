@@ -38,7 +38,7 @@ _TOO_COARSE = "doubles around {!r} are too coarse for them"
 _TOO_MANY = f"it would need more than {MOST_POINTS} points"
 
 
-@functools.lru_cache(maxsize=1024)  # each format takes the same points of a set
+@functools.lru_cache(maxsize=128)  # each format takes the same points of a set
 def points_of(shape: LR, tolerance: float) -> tuple[Points, float]:
     """Return points in the place of an LR set, and the largest error of a degree.
 

@@ -320,7 +320,7 @@ def _read_table(path: PathLike, most: int) -> Recording:
         check_stream(path)
         if Path(path).stat().st_size > LIMIT:
             raise ReadError(f"{name}: is larger than {LIMIT} bytes, too large to read")
-        first = next(pieces(path), None)
+        first = next(pieces(path, only=frozenset()), None)  # its names alone
         if first is None:
             raise ReadError(f"{name}: holds no frame")
         titles, sides = _cell_titles(first.columns, name)
