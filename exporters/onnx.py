@@ -363,7 +363,7 @@ def _facts(
 
 def facts_of(
     model: Model | FuzzySystem,
-    carrier: str,
+    holds: str,
     records: Mapping[str, object],
     /,
     **texts: str,
@@ -373,7 +373,7 @@ def facts_of(
         "format": FORMAT_VERSION,
         "version": version(),
         "name": model.name,
-        "carrier": carrier,
+        "carrier": holds,
         **texts,
         "fingerprint": fingerprint(model),
         **{k: json.dumps(v, ensure_ascii=False) for k, v in records.items()},

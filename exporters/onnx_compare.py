@@ -66,17 +66,15 @@ def differences(
     facts = {p.key.removeprefix("fuzzytree."): p.value for p in result.metadata_props}
     versions = {entry.domain: entry.version for entry in result.opset_import}
     if write is None:
+        write = write_onnx
         needed = json.loads(facts["columns"]) == list(model.inputs)
-        write, options = (
-            write_onnx,
-            {
-                "allow_loss": True,
-                "dtype": facts["dtype"],
-                "signature": "needed" if needed else "all",
-                "readable": facts.get("form") == "readable",
-                "verify": False,
-            },
-        )
+        options = {
+            "allow_loss": True,
+            "dtype": facts["dtype"],
+            "signature": "needed" if needed else "all",
+            "readable": facts.get("form") == "readable",
+            "verify": False,
+        }
     try:
         fresh = write(
             model,

@@ -183,16 +183,17 @@ class _Reader:
         is_list, pairs, items = text[at] == "[", dict[str, Any](), list[Any]()
         close, at = "]" if is_list else "}", _behind_blanks(text, at + 1)
         while text[at : at + 1] != close:
-            key, name = None if is_list else _NAME.match(text, at), ""
-            if key is None and not is_list:
-                self.fail(f"no key: {text[at : at + 40]!r}")
-            if key:
+            if is_list:
+                item, at = self._flow(text, at, level + 1)
+                items.append(item)
+            else:
+                key = _NAME.match(text, at)
+                if key is None:
+                    self.fail(f"no key: {text[at : at + 40]!r}")
                 name = str(self._scalar(key[1]))
-            if name in pairs:
-                self.fail(f"the key {name!r} stands twice")
-            item, at = self._flow(text, key.end() if key else at, level + 1)
-            items.append(item)
-            pairs |= {name: item} if key else {}
+                if name in pairs:
+                    self.fail(f"the key {name!r} stands twice")
+                pairs[name], at = self._flow(text, key.end(), level + 1)
             at = _behind_blanks(text, at)
             if text[at : at + 1] == ",":
                 at = _behind_blanks(text, at + 1)
