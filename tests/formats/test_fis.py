@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 
 import pytest
 
@@ -37,6 +36,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.reference import Status
+from tests.work import at_most
 
 SUGENO = """\
 % a comment
@@ -408,11 +408,9 @@ def test_all_mistakes_are_reported_at_once() -> None:
     ],
     ids=range(10),
 )
-def test_hostile_files_end_in_a_sentence_within_two_seconds(content: bytes) -> None:
-    start = time.process_time()
-    with pytest.raises(ReadError) as caught:
+def test_hostile_files_end_in_a_sentence_after_bounded_work(content: bytes) -> None:
+    with at_most(6_000_000), pytest.raises(ReadError) as caught:
         read_fis(content, "x.fis")
-    assert time.process_time() - start < 2.0
     assert len(str(caught.value)) < 40_000
 
 
@@ -434,12 +432,11 @@ def test_a_system_without_inputs_and_with_a_singleton_is_read() -> None:
 
 
 @pytest.mark.heavy
-def test_thousands_of_terms_of_one_name_are_read_quickly() -> None:
+def test_thousands_of_terms_of_one_name_are_read_with_bounded_work() -> None:
     many = "".join(f"MF{k}='a':'trimf',[0 1 2]\n" for k in range(1, 20_001))
     start, _, rest = SUGENO.partition("MF1='slow'")
     text = start.replace("NumMFs=1\n", "") + many + rest.partition("\n")[2]
-    began = time.process_time()
-    assert len(read(text).variables[1].terms) == 20_000
-    assert time.process_time() - began < 5.0
+    with at_most(6_000_000):
+        assert len(read(text).variables[1].terms) == 20_000
     with pytest.raises(ReadError, match="lines are more than the 60,000 that are read"):
         read(text + "1 1, 1 (1) : 1\n" * 60_000)

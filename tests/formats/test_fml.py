@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import time
 
 import pytest
 
@@ -32,6 +31,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.samples import all_samples
+from tests.work import at_most
 
 TIPPER = """\
 <?xml version="1.0" encoding="UTF-8"?>
@@ -318,11 +318,9 @@ def bomb(levels: int) -> str:
     ],
     ids=range(12),
 )
-def test_hostile_files_end_in_a_sentence_within_two_seconds(content: bytes) -> None:
-    start = time.process_time()
-    with pytest.raises(ReadError) as caught:
+def test_hostile_files_end_in_a_sentence_after_bounded_work(content: bytes) -> None:
+    with at_most(6_000_000), pytest.raises(ReadError) as caught:
         read_fml(content, "x.xml")
-    assert time.process_time() - start < 2.0
     assert len(str(caught.value)) < 10_000
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import time
 from pathlib import Path
 
 import msgspec
@@ -33,6 +32,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics.inference import infer
 from fuzzytree.testing import random_rows, random_system
+from tests.work import at_most
 
 EXAMPLES = Path(__file__).parents[1] / "example-files" / "positive"
 TIPPER = (EXAMPLES / "system-tipper.yaml").read_text("utf-8")
@@ -250,10 +250,9 @@ def hostile() -> dict[str, str]:
 
 @pytest.mark.one_in(6)
 @pytest.mark.parametrize("name", hostile())
-def test_a_hostile_system_ends_in_an_error_in_bounded_time(name: str) -> None:
-    start = time.process_time()
-    text = error_of(hostile()[name])
-    assert time.process_time() - start < 5.0
+def test_a_hostile_system_ends_in_an_error_after_bounded_work(name: str) -> None:
+    with at_most(6_000_000):
+        text = error_of(hostile()[name])
     assert len(text.splitlines()) <= 101
     assert len(text) < 200_000
     assert all(line.startswith("x.yaml:") for line in text.splitlines())

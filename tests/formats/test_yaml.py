@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import time
 from pathlib import Path
 
 import pytest
@@ -15,6 +14,7 @@ from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Proposition, RuleBase
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
+from tests.work import at_most
 
 EXAMPLES = Path(__file__).parents[1] / "example-files"
 POSITIVE = sorted((EXAMPLES / "positive").glob("*.yaml"))
@@ -123,7 +123,7 @@ def mutated(chance: random.Random, text: str) -> bytes:
 
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize("seed", range(8))
-def test_a_damaged_file_gives_a_read_error_or_a_model_in_bounded_time(
+def test_a_damaged_file_gives_a_read_error_or_a_model_after_bounded_work(
     seed: int,
 ) -> None:
     chance = random.Random(seed)
@@ -134,11 +134,10 @@ def test_a_damaged_file_gives_a_read_error_or_a_model_in_bounded_time(
     ]
     for _ in range(150):
         content = mutated(chance, chance.choice(texts))
-        start = time.process_time()
-        model = model_or_none(content)
-        if model is not None:
-            assert read_yaml(write(model).content, "x.yaml").model == model
-        assert time.process_time() - start < 5
+        with at_most(1_000_000):
+            model = model_or_none(content)
+            if model is not None:
+                assert read_yaml(write(model).content, "x.yaml").model == model
 
 
 def test_lines_are_swapped_without_an_error_of_another_kind() -> None:
@@ -177,9 +176,8 @@ def test_thousands_of_mistakes_are_listed_in_part_and_at_once() -> None:
     text = RULES.replace("rules:\n", f"{variables}rules:\n{wrong}").replace(
         "columns: [sepal length, sepal width, petal length, petal width]\n", ""
     )
-    start = time.process_time()
-    message = error_of(text).splitlines()
-    assert time.process_time() - start < 10
+    with at_most(3_000_000):
+        message = error_of(text).splitlines()
     assert len(message) == 101
     assert message[0].startswith("x.yaml:6033:8: rule 1: 'petal length' has no term")
     assert message[-1] == "x.yaml: and at least 200 more mistakes"
@@ -187,7 +185,7 @@ def test_thousands_of_mistakes_are_listed_in_part_and_at_once() -> None:
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("longest", [8, 200])
-def test_sentences_of_traps_are_read_in_bounded_time(longest: int) -> None:
+def test_sentences_of_traps_are_read_with_bounded_work(longest: int) -> None:
     names = [" or ".join(["a"] * n) for n in range(1, longest)]
     listed = "".join(f"  - {{name: {name}, degree: 1}}\n" for name in names)
     text = RULES.replace(
@@ -196,9 +194,8 @@ def test_sentences_of_traps_are_read_in_bounded_time(longest: int) -> None:
         + f"- {{if: [a is {'a or ' * 10_000}a], then: setosa}}\n" * 20
         + f"- {{if: [{'a is ' * 100}{'a or ' * 1000}a], then: setosa}}\n" * 20,
     ).replace("columns", "# columns")
-    start = time.process_time()
-    assert error_of(text).startswith("x.yaml:")
-    assert time.process_time() - start < 10
+    with at_most(1_000_000):
+        assert error_of(text).startswith("x.yaml:")
 
 
 def test_a_name_has_a_longest_length() -> None:
@@ -207,13 +204,12 @@ def test_a_name_has_a_longest_length() -> None:
 
 
 @pytest.mark.heavy
-def test_ten_thousand_rules_are_read_in_seconds() -> None:
+def test_ten_thousand_rules_are_read_with_bounded_work() -> None:
     tree = random_tree(1, leaves=500, inputs=10, combinations=0.0)
     rules = rules_from_tree(tree)
     many = RuleBase(
         "many", rules.classes, rules.variables, rules.rules * 20, rules.semantics
     )
-    start = time.process_time()
-    content = write(many).content
-    assert read_yaml(content, "x.yaml").model == many
-    assert time.process_time() - start < 30
+    with at_most(20_000_000):
+        content = write(many).content
+        assert read_yaml(content, "x.yaml").model == many
