@@ -46,7 +46,8 @@ pytestmark = pytest.mark.usefixtures("few_objects")
 
 ROOT = Path(__file__).resolve().parents[2]
 RULES = rules_from_tree(random_tree(3), "raw")
-SMALL = BenchSettings(rows=(4,), threads=(1,), rounds=6, budget_s=10.0)
+PATIENCE_S = 600.0  # of what ends by its rounds, however busy the machine is
+SMALL = BenchSettings(rows=(4,), threads=(1,), rounds=6, budget_s=PATIENCE_S)
 MS = 1_000_000
 
 
@@ -302,7 +303,7 @@ def test_what_others_are_compared_with_comes_first() -> None:
 @pytest.mark.heavy
 def test_two_threads_are_for_those_who_can_use_them() -> None:
     loads: dict[str, list[int]] = {"one": [], "both": []}
-    plan = BenchSettings(rows=(2, 3), threads=(1, 2), rounds=6, budget_s=5.0)
+    plan = BenchSettings(rows=(2, 3), threads=(1, 2), rounds=6, budget_s=PATIENCE_S)
     study = studied(
         candidate("one", loads=loads["one"]),
         candidate("both", loads=loads["both"], is_parallel=True),
@@ -330,14 +331,14 @@ def test_what_takes_longer_to_load_again_than_there_is_time_is_an_omission() -> 
 
 
 def test_nobody_waits_for_a_second_thread_that_nobody_uses() -> None:
-    plan = BenchSettings(rows=(2,), threads=(1, 2), rounds=6, budget_s=5.0)
+    plan = BenchSettings(rows=(2,), threads=(1, 2), rounds=6, budget_s=PATIENCE_S)
     study = studied(candidate("native"), plan=plan)
     assert [timing.threads for timing in study.points[0].timings] == [1]
 
 
 @pytest.mark.heavy
 def test_rows_that_memory_does_not_hold_are_an_omission() -> None:
-    plan = BenchSettings(rows=(2, 10**9), threads=(1,), rounds=6, budget_s=5.0)
+    plan = BenchSettings(rows=(2, 10**9), threads=(1,), rounds=6, budget_s=PATIENCE_S)
     (why,) = omitted(studied(candidate(), plan=plan)).values()
     pattern = (
         r"1,000,000,000 rows: their layouts take about \d+ GiB, and 6 are the most"
@@ -483,7 +484,7 @@ def test_values_that_do_not_fit_are_refused() -> None:
 @pytest.mark.heavy
 def test_a_study_of_a_real_model_agrees_with_itself() -> None:
     only = ["native", "native float32", "best-first", "python", "floor"]
-    plan = BenchSettings(rows=(1, 300), threads=(1,), rounds=6, budget_s=6.0)
+    plan = BenchSettings(rows=(1, 300), threads=(1,), rounds=6, budget_s=PATIENCE_S)
     study = bench(random_tree(5), only=only, plan=plan)
     assert study.is_complete
     assert [*faults(study.points)] == []
@@ -503,7 +504,7 @@ def test_a_study_of_a_real_model_agrees_with_itself() -> None:
 def test_rows_of_a_table_are_named_and_counted() -> None:
     tree = random_tree(1)
     values = made_rows(tree, 7)[0]
-    plan = BenchSettings(rows=(5, 20), threads=(1,), rounds=6, budget_s=3.0)
+    plan = BenchSettings(rows=(5, 20), threads=(1,), rounds=6, budget_s=PATIENCE_S)
     study = bench(tree, values=values, data="t.csv", only=["native: tree"], plan=plan)
     assert study.data == "t.csv, 7 rows, repeated to make 20"
     assert study.points[0].error is not None

@@ -263,7 +263,7 @@ def test_costs_are_measured_in_every_stage(tmp_path: Path) -> None:
 @pytest.mark.heavy
 def test_a_tree_of_one_leaf_needs_nothing_and_is_timed() -> None:
     tree = random_tree(1, leaves=1)
-    footprint = report(tree, pruned(tree), seconds=5.0)
+    footprint = report(tree, pruned(tree), seconds=600.0)
     assert footprint.proof.ok
     assert footprint.needs.inputs == ()
     assert {cost.what for cost in footprint.costs} == {"open", "one row", "10,000 rows"}
