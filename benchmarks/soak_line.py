@@ -61,16 +61,20 @@ def soak_line(
     board: Board,
     seconds: float,
     *,
+    least: int = 0,
     faults: ConnectionFaults = LINE_FAULTS,
     seed: int = 0,
 ) -> Heard:
-    """Let a line read a board with faults for some seconds; hold it to the laws."""
+    """Let a line read a board with faults for some seconds; hold it to the laws.
+
+    It takes longer where so many frames (`least`) have not been offered by then.
+    """
     if isinstance(board.protocol, Request):
         quick = replace(board.protocol, timeout_s=_TIMEOUT_S)
         board = replace(board, protocol=quick)
     pool = pool_of(board, FAULTS, np.random.default_rng(seed))
     heard, begin = Heard(), time.monotonic()
-    frames = _frames(pool, begin + seconds)
+    frames = _frames(pool, begin + seconds, least)
     with FaultyDevice(board, frames, faults, None, seed=seed) as device:
         with open_connection(board, device.port, most_waiting=10_000) as line:
             _listen(line, device, pool, heard)
@@ -81,9 +85,9 @@ def soak_line(
     return heard
 
 
-def _frames(pool: Pool, until: float) -> Iterator[Cells]:
-    for cells in itertools.cycle(pool.cells):
-        if time.monotonic() > until:
+def _frames(pool: Pool, until: float, least: int) -> Iterator[Cells]:
+    for count, cells in enumerate(itertools.cycle(pool.cells)):
+        if count >= least and time.monotonic() > until:
             return
         yield cells
 

@@ -62,7 +62,7 @@ def _sent(board: Board, frames: list[Cells]) -> bytes:
 def _host(device: Device, baud: int = 115200) -> serial.Serial:
     while not Path(device.port).exists():
         time.sleep(0.005)
-    return serial.Serial(device.port, baud, timeout=5.0, exclusive=True)
+    return serial.Serial(device.port, baud, timeout=120.0, exclusive=True)
 
 
 def _all(device: Device, host: serial.Serial) -> bytes:
@@ -301,7 +301,7 @@ def _running(*words: str | Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
 
 def _taken(board: Board, port: str, count: int) -> list[Cells]:
     with open_connection(board, port) as line:
-        frames = [line.take(5.0) for _ in range(count)]
+        frames = [line.take(120.0) for _ in range(count)]
     return [frame.cells for frame in frames if frame is not None]
 
 
@@ -315,7 +315,7 @@ def test_objects_are_fitted_to_the_board_until_a_signal(
         assert port == str(tmp_path / "port")
         frames = _taken(BOARD, port, 20)
         process.send_signal(number)
-        _, err = process.communicate(timeout=20.0)
+        _, err = process.communicate(timeout=120.0)
     assert [int(cells.max()) for cells in frames[:3]] == [0, 0, 0]
     assert frames[-1].shape == (4, 6)
     assert 20 < max(int(cells.max()) for cells in frames) <= 200
@@ -333,7 +333,7 @@ def test_a_recording_goes_through_a_port_again(tmp_path: Path) -> None:
     begin = time.monotonic()
     with _running("--recording", tmp_path / "a.ftr", "--speed", "5") as (process, port):
         frames = _taken(board, port, 3 + 6)
-        _, err = process.communicate(timeout=20.0)
+        _, err = process.communicate(timeout=120.0)
     assert time.monotonic() - begin >= 2.5 / 5
     assert [int(cells[0, 0]) for cells in frames] == [7, 7, 7, 0, 10, 20, 30, 40, 50]
     assert (process.returncode, err.split(",")[0]) == (0, "frames 9")

@@ -442,7 +442,7 @@ def test_a_signal_leaves_no_file(number: int, output: str) -> None:
             time.sleep(0.01)
         time.sleep(wait_s)
         process.send_signal(number)
-        _, err = process.communicate(timeout=30)
+        _, err = process.communicate(timeout=120)
         assert (process.returncode, err) == (
             130,
             "interrupted; files are as they were\n",

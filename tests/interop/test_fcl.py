@@ -271,7 +271,7 @@ def test_a_file_that_fuzzylite_wrote_of_ours_is_ours(
     first.write_bytes(write(system, dialect="fuzzylite").content)
     files = ("-i", str(first), "-if", "fcl", "-o", str(second), "-of", "fcl")
     command = [program("fuzzylite"), *files, "-decimals", "17"]
-    subprocess.run(command, check=True, capture_output=True, timeout=60)
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
     again = read_fcl(second.read_bytes(), "theirs.fcl").model
     assert isinstance(again, FuzzySystem)
     for row in random_rows(system, 6, 30):

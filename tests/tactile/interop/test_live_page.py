@@ -27,7 +27,7 @@ EVIL = "<script>alert(1)</script>"
 NOTHING = np.zeros((4, 4), np.int64)
 SMALL = np.eye(4, dtype=np.int64) * 90
 LARGE = np.full((4, 4), 90)
-PATIENCE_S = 10.0
+PATIENCE_S = 120.0
 
 
 class Shown:

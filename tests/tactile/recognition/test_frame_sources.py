@@ -43,7 +43,7 @@ def source(wire: Wire, tmp_path: Path) -> Iterator[Connection]:
 
 
 def until(is_so: Callable[[], bool]) -> None:
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + 120.0
     while not is_so():
         assert time.monotonic() < end
         time.sleep(0.01)

@@ -57,7 +57,7 @@ def wanted(
     origin: str | None = None,
 ) -> HTTPResponse:
     place = urlsplit(page.url)
-    connection = HTTPConnection(place.netloc, timeout=10)
+    connection = HTTPConnection(place.netloc, timeout=120)
     connection.putrequest(method, path, skip_host=host is not None)
     if host is not None:
         connection.putheader("Host", host)
