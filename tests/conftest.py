@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shlex
 import signal
 import sys
 from collections import Counter
@@ -40,6 +41,17 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
         gc.collect()
         gc.freeze()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print, for each test that failed, the command that runs it alone."""
+    stats = terminalreporter.stats
+    names = [
+        report.nodeid for kind in ("failed", "error") for report in stats.get(kind, ())
+    ]
+    for name in dict.fromkeys(names):
+        words = (".venv/bin/python", "-m", "pytest", "-m", "heavy or not heavy", name)
+        terminalreporter.write_line(f"run it alone: {shlex.join(words)}")
 
 
 _MANY_CASES = 6
