@@ -34,8 +34,8 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
-from fuzzytree.errors import WriteError, install_hint
-from fuzzytree.files import write_atomically
+from fuzzytree.errors import install_hint
+from fuzzytree.files import check_place, write_atomically
 from fuzzytree.learning import LearningSettings
 
 _FRAMES_SHOWN = 7
@@ -121,7 +121,7 @@ def command(options: ExperimentOptions) -> None:
     """
     _check_options(options.task)
     if options.output is not None:
-        _check_folder(Path(options.output))
+        check_place(Path(options.output, "tree.yaml"))
     given = {
         "mode": options.mode,
         "shrinkage": options.shrinkage,
@@ -225,18 +225,6 @@ def _printed(task: str) -> dict[str, int]:
     return dict(TABLE_3) if task == "paper" else {}
 
 
-def _check_folder(folder: Path) -> None:
-    """Refuse a folder that cannot be made, before long work is done for it.
-
-    Raises:
-        WriteError: If it is a file, or what it is in does not exist.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise WriteError(f"{folder}: is a file, and not a folder to write to")
-    if not folder.parent.is_dir():
-        raise WriteError(f"{folder}: cannot be made: there is no {folder.parent}")
-
-
 def _write(
     folder: Path, task: Task, outcome: Outcome, lines: list[str], *, quiet: bool
 ) -> None:
@@ -246,7 +234,6 @@ def _write(
     from fuzzytree.tactile.board_file import board_text
     from fuzzytree.tactile.boards import Board, Marker
 
-    folder.mkdir(exist_ok=True)
     board = Board(task.name[:60], task.sensor, Marker("AA 55", task.sensor.bits))
     files = {
         "tree.yaml": export(outcome.tree, "yaml").content,

@@ -48,7 +48,6 @@ def main() -> None:
     print(f"\nThe same as rules:\n{rules}")
 
     head("Write: YAML to read, ONNX to run")
-    OUT.mkdir(exist_ok=True)
     for model, stem in ((tree, "wine-tree"), (rules, "wine-rules")):
         for suffix in (".yaml", ".onnx"):
             path = OUT / f"{stem}{suffix}"

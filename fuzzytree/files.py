@@ -6,7 +6,6 @@ import contextlib
 import os
 import re
 import secrets
-import shlex
 import stat
 import sys
 from collections.abc import Generator, Iterable
@@ -61,9 +60,9 @@ def read_bounded(path: PathLike, limit: int = LIMIT) -> bytes:
 def write_atomically(path: PathLike, content: bytes, *, replace: bool = True) -> None:
     """Write a file whole, or leave what stood there as it was.
 
-    The content goes to a new file in the same folder, is flushed to the disk and then
-    takes the old file's place and mode. A link is followed: its target is replaced.
-    A device or a pipe is written to directly.
+    The content goes to a new file in the same folder, which is made if it is missing,
+    is flushed to the disk and then takes the old file's place and mode. A link is
+    followed: its target is replaced. A device or a pipe is written to directly.
 
     Args:
         path: The file.
@@ -79,7 +78,7 @@ def write_atomically(path: PathLike, content: bytes, *, replace: bool = True) ->
 
 
 def check_place(path: PathLike) -> None:
-    """Refuse a place that is a folder or has none, before long work is done for it.
+    """Refuse a place where no file can be, before long work is done for it.
 
     Raises:
         WriteError: If a file cannot be written there, as far as can be checked before.
@@ -87,11 +86,10 @@ def check_place(path: PathLike) -> None:
     name, target = os.fspath(path), Path(path)
     if target.is_dir():
         raise WriteError(f"{name}: cannot be written: it is a folder")
-    _check_folder(path)
     needed = [target] if target.exists() else []
     if target.is_file() or not needed:  # a new file takes the old one's place
-        needed.append(target.parent)
-    if not all(os.access(one, os.W_OK) for one in needed):
+        needed.append(_nearest_folder(path))
+    if not all(os.access(place, os.W_OK) for place in needed):
         raise WriteError(f"{name}: cannot be written: it is write-protected")
 
 
@@ -123,7 +121,7 @@ def open_atomically(path: PathLike, *, replace: bool = True) -> Generator[Binary
         mode = _mode(Path(path))
         target = Path(os.path.realpath(path))
         if mode is None:
-            _check_folder(path)
+            _nearest_folder(path)
         elif not replace:
             raise FileExistsError
         if mode is None or stat.S_ISREG(mode):
@@ -147,9 +145,11 @@ def _appearing(target: Path, mode: int | None, *, replace: bool) -> Generator[Bi
     if mode is not None and not os.access(target, os.W_OK):
         raise PermissionError(None, "it is write-protected")
     _remove_leftovers(target)
+    new_folders = [folder for folder in target.parents if not folder.exists()]
     part = f"{_part_prefix(target)}{secrets.token_hex(8)}.part"
     temporary = target.with_name(part)
     try:  # from here on: a Ctrl-C may come as soon as the file is there
+        target.parent.mkdir(parents=True, exist_ok=True)
         with _new_part(temporary) as file:
             if mode is not None:
                 temporary.chmod(stat.S_IMODE(mode))
@@ -162,6 +162,9 @@ def _appearing(target: Path, mode: int | None, *, replace: bool) -> Generator[Bi
             _name_anew(temporary, target)
     except BaseException:
         temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # another process writes there as well
+            for folder in new_folders:
+                folder.rmdir()
         raise
 
 
@@ -205,15 +208,22 @@ def _lock(handle: int, *, waits: bool = True) -> None:
         fcntl.flock(handle, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
 
 
-def _check_folder(path: PathLike) -> None:
-    folder = Path(path).parent
-    if folder.is_dir():
-        folder = Path(os.path.realpath(path)).parent  # where a link leads
+def _nearest_folder(path: PathLike) -> Path:
+    """Return the folder of a file, or the nearest one above that is there.
+
+    Raises:
+        WriteError: If a file stands where a folder is needed.
+    """
+    target = Path(path)
+    if target.is_symlink():  # the folder that it leads to
+        target = Path(os.path.realpath(path))
+    folder = next(folder for folder in target.parents if os.path.lexists(folder))
     if not folder.is_dir():
         raise WriteError(
-            f"{os.fspath(path)}: cannot be written: there is no folder "
-            f"{os.fspath(folder)!r}; mkdir -p {shlex.quote(os.fspath(folder))} makes it"
+            f"{os.fspath(path)}: cannot be written: {os.fspath(folder)!r} is not a "
+            "folder"
         )
+    return folder
 
 
 def _name_anew(temporary: Path, target: Path) -> None:
@@ -239,7 +249,7 @@ def _name_anew(temporary: Path, target: Path) -> None:
 def _mode(path: Path) -> int | None:
     try:
         return path.stat().st_mode
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return None
     except ValueError as error:  # a name that no file can have
         raise OSError(None, str(error)) from error

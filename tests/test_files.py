@@ -286,12 +286,30 @@ def test_two_writers_of_one_file_do_not_disturb_each_other(tmp_path: Path) -> No
     assert _names(tmp_path) == ["grip.yaml"]
 
 
-def test_a_missing_folder_is_named_with_what_makes_it(tmp_path: Path) -> None:
-    path = tmp_path / "new folder" / "grip.yaml"
-    text = (
-        f"{path}: cannot be written: there is no folder '{path.parent}'; "
-        f"mkdir -p '{path.parent}' makes it"
-    )
+def test_a_writer_makes_the_folder_of_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "new folder" / "more" / "grip.yaml"
+    check_place(path)
+    assert _names(tmp_path) == []
+    write_atomically(path, b"new", replace=False)
+    assert path.read_bytes() == b"new"
+    link = tmp_path / "link.yaml"
+    link.symlink_to(tmp_path / "elsewhere" / "grip.yaml")
+    check_place(link)
+    write_atomically(link, b"new")
+    assert (tmp_path / "elsewhere" / "grip.yaml").read_bytes() == b"new"
+
+
+def test_an_interrupted_writer_leaves_no_new_folder(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        _interrupted(tmp_path / "new" / "more" / "out.csv")
+    assert _names(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["few.csv/grip.yaml", "few.csv/more/grip.yaml"])
+def test_a_file_where_a_folder_is_needed_is_named(tmp_path: Path, name: str) -> None:
+    (tmp_path / "few.csv").touch()
+    path = tmp_path / name
+    text = f"{path}: cannot be written: '{tmp_path / 'few.csv'}' is not a folder"
     with pytest.raises(WriteError) as caught:
         check_place(path)
     assert str(caught.value) == text

@@ -167,8 +167,10 @@ def test_without_scikit_learn_the_experiment_goes_on_and_says_so(
         (["bars.npz", "--test", "bars.npz"], "3 subjects are both in bars.npz and in"),
         (["bars.npz", "--entry", "-1"], "entry is at least 0, not -1.0"),
         (["bars.npz", "--features", "S12"], "'S12' is no feature of a frame"),
-        (["bars.npz", "-o", "no/where"], "no/where: cannot be made: there is no no"),
-        (["bars.npz", "-o", "grasps.csv"], "grasps.csv: is a file, and not a folder"),
+        (
+            ["bars.npz", "-o", "grasps.csv"],
+            "grasps.csv/tree.yaml: cannot be written: 'grasps.csv' is not a folder",
+        ),
         (["none.npz"], "none.npz: "),
         (["touch", "--data", "."], "capfinger_27x15.npz: is not there"),
     ],

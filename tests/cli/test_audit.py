@@ -293,11 +293,8 @@ HELP = "\n  fuzzytree audit --help lists the options\n"
             "invalid character (byte 5)\n",
         ),
         (
-            ("--page", "none/x.html"),
-            (
-                "none/x.html: cannot be written: "
-                "there is no folder 'none'; mkdir -p none makes it\n"
-            ),
+            ("--page", "few.csv/x.html"),
+            "few.csv/x.html: cannot be written: 'few.csv' is not a folder\n",
         ),
     ],
     ids=lambda found: " ".join(found) if isinstance(found, tuple) else "",

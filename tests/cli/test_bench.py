@@ -261,12 +261,10 @@ def test_a_place_that_cannot_be_written_is_reported_before_any_work(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(api, "bench", None)
-    message = (
-        "no/such.json: cannot be written: "
-        "there is no folder 'no'; mkdir -p no makes it\n"
-    )
-    assert call("bench", "grip.yaml", "-o", "no/such.json") == (2, "", message)
-    code, _, err = call("bench", "grip.yaml", "--plot", "no/such.svg")
+    Path("file").touch()
+    message = "file/such.json: cannot be written: 'file' is not a folder\n"
+    assert call("bench", "grip.yaml", "-o", "file/such.json") == (2, "", message)
+    code, _, err = call("bench", "grip.yaml", "--plot", "file/such.svg")
     assert (code, err) == (2, message.replace("json", "svg"))
 
 

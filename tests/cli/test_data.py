@@ -46,12 +46,10 @@ def test_the_delimiter_can_be_reported_where_a_message_names_it(
     assert call(*words, "--data", "odd.csv", "--delimiter", ";")[0] == 0
 
 
-def test_needs_refuses_a_place_without_a_folder_before_any_work(
+def test_needs_refuses_a_place_within_a_file_before_any_work(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("fuzzytree.benchmarking.savings.report", None)
-    message = (
-        "no/left.yaml: cannot be written: "
-        "there is no folder 'no'; mkdir -p no makes it\n"
-    )
-    assert call("needs", "grip.yaml", "-o", "no/left.yaml") == (2, "", message)
+    Path("file").touch()
+    message = "file/left.yaml: cannot be written: 'file' is not a folder\n"
+    assert call("needs", "grip.yaml", "-o", "file/left.yaml") == (2, "", message)

@@ -214,8 +214,9 @@ def test_another_suffix_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="ends in") as caught:
         picture.save(path)
     assert str(caught.value) == f"{path}: a picture's name ends in .svg or .png"
-    with pytest.raises(WriteError, match="there is no folder"):
-        picture.save(tmp_path / "nowhere" / "study.svg")
+    picture.save(tmp_path / "new" / "study.svg")
+    with pytest.raises(WriteError, match="is not a folder"):
+        picture.save(tmp_path / "new" / "study.svg" / "study.svg")
 
 
 def test_a_png_without_the_extra_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
