@@ -362,6 +362,7 @@ def gather(model: Model, values: FloatArray, peers: str | None = None) -> Candid
     bounds = _bounds(values)
     mine, absent = own(model, bounds, layouts)
     others, missing = load_peers(peers)(model, bounds)
+    missing = [replace(one, is_peer=True) for one in missing]
     changed, left = variants(model, bounds, layouts)
     return [*measures, *mine, *others, *changed], [*omitted, *absent, *missing, *left]
 

@@ -79,10 +79,11 @@ class Candidate(msgspec.Struct, frozen=True):
 
 
 class Omission(msgspec.Struct, frozen=True):
-    """What was left out of a study, and why."""
+    """What was left out of a study, and why, and whether it is a peer."""
 
     name: str
     why: str
+    is_peer: bool = False
 
 
 class Timing(msgspec.Struct, frozen=True):

@@ -51,7 +51,7 @@ class BenchSettings(msgspec.Struct, frozen=True):
         rows: Rows in a call, each a column of the study.
         threads: Threads that a candidate is allowed, one number after another.
         most: The largest error of a strength that the user allows, if any.
-        budget_s: The time for the study; see `bench`.
+        budget_s: The time for the study, beside that for loading peers; see `bench`.
         rounds: The most samples of each timing.
         seed: Of made rows, and of the order of the rounds.
         peers: The path of a Python module or package, which is run, and whose function
@@ -235,7 +235,8 @@ class _Run:
     ) -> None:
         self.model, self.values, self.plan = model, values, plan
         self.progress, self.clock = progress, clock
-        self.begin = clock.wall()
+        self.start = self.begin = clock.wall()
+        self.peers: set[str] = set()
         self.drafts: dict[str, _Draft] = {}
         self.omissions: list[Omission] = []
         self.warnings: list[str] = []
@@ -244,24 +245,33 @@ class _Run:
         self.is_interrupted = False
 
     def spent_s(self) -> float:
-        """Return how long the study has been running."""
+        """Return how much of the budget is spent."""
         return (self.clock.wall() - self.begin) / 1e9
 
     def omit(self, name: str, why: str) -> None:
         """Leave a candidate out, or some rows of it."""
-        self.omissions.append(Omission(name, why))
+        self.omissions.append(Omission(name, why, is_peer=name in self.peers))
 
     def try_foreign(self, candidates: Sequence[Candidate]) -> None:
-        """Leave out what ends or blocks a child process."""
+        """Leave out what ends or blocks a child process.
+
+        The budget does not end the trial of peers, which were asked for, and begins
+        after it: how long their libraries take to load depends on the machine's load.
+        """
+        self.peers = {c.name for c in candidates if c.kind == "peer"}
         todo = [c for c in candidates if c.modules or c.kind == "peer"]
         faults = trial.tried(
             self.model,
             [c.name for c in sorted(todo, key=_rank)],
             self.values[:, :_TRIED],
             peers=self.plan.peers,
-            left=lambda: self.plan.budget_s / 3 - self.spent_s(),
+            left=lambda: (
+                math.inf if self.peers else self.plan.budget_s / 3 - self.spent_s()
+            ),
             progress=_part(self.progress, 0.0, 0.1),
         )
+        if self.peers:
+            self.begin = self.clock.wall()
         for name, why in faults.items():
             self.omit(name, why)
         self.faulty |= set(faults)
@@ -274,7 +284,8 @@ class _Run:
         # If the time is short, what others are compared with is still there.
         for position, one in enumerate(sorted(todo, key=_rank)):
             progress(f"judging {one.name}", position / len(todo))
-            if self.spent_s() > self.plan.budget_s / 2 and _rank(one):
+            is_due = not _rank(one) or one.kind == "peer"
+            if self.spent_s() > self.plan.budget_s / 2 and not is_due:
                 why = "half of the budget was over before it was judged"
                 self.omit(one.name, f"{why}; a larger one helps")
                 continue
@@ -351,6 +362,8 @@ class _Run:
         """Leave out candidates that cannot have six samples in the time."""
         costs = {name: self.drafts[name].row_ns * rows for name in names}
         ranks = {name: _rank(self.drafts[name].candidate) for name in names}
+        if rows == min(self.plan.rows):  # where each peer has a time
+            ranks |= dict.fromkeys(self.peers & {*names}, 0)
         kept = fitting(costs, ranks, seconds * 1e9, min(SURE, self.plan.rounds))
         for name in names:
             if name not in kept:
@@ -426,7 +439,7 @@ class _Run:
             is_complete=self.is_complete,
             fronts=fronts(points),
             seed=self.plan.seed,
-            seconds=self.spent_s(),
+            seconds=(self.clock.wall() - self.start) / 1e9,
             is_interrupted=self.is_interrupted,
         )
 

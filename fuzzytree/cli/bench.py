@@ -61,7 +61,9 @@ class BenchOptions(FullResultOptions):
     )
     skip: Sequence[str] = several("--skip NAME", "Candidates to leave out (repeat).")
     budget: float = option(
-        "--budget SECONDS", "Approximate time limit in seconds.", default=300.0
+        "--budget SECONDS",
+        "Approximate time limit in seconds, beside that for loading peers.",
+        default=300.0,
     )
     error: float | None = option(
         "--error E",
@@ -92,7 +94,7 @@ def command(options: BenchOptions) -> int:
     Runtimes, number types, approximations and what --peers adds predict the same rows
     in interleaved rounds; errors are those against exact arithmetic. Ctrl-C ends the
     study early, keeps its results, and exits with 130; exit 1 if an error is larger
-    than its certified bound.
+    than its certified bound, or if --peers adds none that could be measured.
     """
     from fuzzytree import api
     from fuzzytree.benchmarking import BenchSettings
@@ -133,10 +135,10 @@ def command(options: BenchOptions) -> int:
             answer("\n".join(lines))
     for place in (*([output] if output else []), *_draw(found, plots)):
         say(f"wrote    {place}", quiet=options.quiet)
-    return _ending(found, as_json=options.as_json, quiet=options.quiet)
+    return _ending(found, options)
 
 
-def _ending(found: Study, *, as_json: bool, quiet: bool) -> int:
+def _ending(found: Study, options: BenchOptions) -> int:
     """Report what went wrong, and return the exit code."""
     from fuzzytree.benchmarking import faults
 
@@ -149,11 +151,13 @@ def _ending(found: Study, *, as_json: bool, quiet: bool) -> int:
         say("nothing could be measured")
         return 2
     wrong = [*faults(found.points)]
+    if options.peers and all(point.kind != "peer" for point in found.points):
+        wrong.append(f"no peer of {options.peers} was measured")
     if wrong:
         say(wrong[-1])
         return 1
-    if as_json:
-        say(found.advice[-1] if found.advice else "measured", quiet=quiet)
+    if options.as_json:
+        say(found.advice[-1] if found.advice else "measured", quiet=options.quiet)
     return 0
 
 

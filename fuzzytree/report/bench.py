@@ -54,6 +54,10 @@ def study_lines(
     advice = study.advice[-1] if study.advice else _nothing(study)
     yield from wrapped(advice, _WIDTH, rest="  ")
     yield f"{study.model}: {study.data}; {study.seconds:.0f} s"
+    names = {point.name for point in study.points}
+    left = [one for one in study.omissions if one.name not in names]
+    for line in _grouped(one for one in left if one.is_peer):
+        yield from wrapped(f"peers left out: {line}", _WIDTH, rest="  ")
     if is_verbose or is_full:
         yield from _tables(study, is_full=is_full)
         return
@@ -62,7 +66,7 @@ def study_lines(
     for text in study.warnings[:2]:
         yield from wrapped(f"doubtful: {text}", _WIDTH, rest="  ")
     yield from more_line(len(study.warnings) - 2, "doubt")
-    names = {one.name for one in study.omissions}
+    names = {one.name for one in study.omissions if one not in left or not one.is_peer}
     if names:
         yield f"{counted(len(names), 'candidate')} left out"
     yield "--verbose lists every time, error, omission and advice"

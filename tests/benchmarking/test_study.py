@@ -17,6 +17,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from fuzzytree.benchmarking import trial
 from fuzzytree.benchmarking.candidates import chosen, found_of, gather
 from fuzzytree.benchmarking.clock import TimeSource
 from fuzzytree.benchmarking.judging import made_rows, repeated
@@ -280,6 +281,24 @@ def test_half_of_the_budget_is_for_timing() -> None:
         "a larger one helps",
     }
     assert [point.name for point in study.points] == ["native: rules"]
+
+
+def test_no_load_leaves_out_a_peer(monkeypatch: pytest.MonkeyPatch) -> None:
+    time = FakeTime()
+
+    def slow_trial(*_: object, left: Callable[[], float], **__: object) -> object:
+        time.now += 500_000 * MS  # of loading libraries on a busy machine
+        return {} if left() > 0.0 else pytest.fail("the budget was over")
+
+    monkeypatch.setattr(trial, "tried", slow_trial)
+    study = studied(
+        candidate("b", time=time, ms=1200.0),
+        msgspec.structs.replace(candidate("c", time=time, ms=40.0), kind="peer"),
+        candidate("native", time=time),
+        plan=BenchSettings(rows=(1,), threads=(1,), rounds=6, budget_s=2.0),
+        time=time,
+    )
+    assert {point.name for point in study.points} >= {"native: rules", "c: rules"}
 
 
 def test_what_others_are_compared_with_comes_first() -> None:

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree import api
-from fuzzytree.benchmarking.records import Study
+from fuzzytree.benchmarking.records import Omission, Study
 from fuzzytree.errors import install_hint
 from fuzzytree.report.bench import study_lines
 from fuzzytree.report.text import duration
@@ -116,10 +116,28 @@ def test_a_named_module_adds_candidates_and_omissions(call: Call) -> None:
         "utf-8",
     )
     words = ("bench", "grip.yaml", "--peers", "my_peers.py", "--json", *FAST)
-    code, out, _ = call(*words)
-    assert code == 0
-    omission = {"name": "my peer", "why": "it has no licence"}
+    code, out, err = call(*words)
+    assert (code, err) == (1, "no peer of my_peers.py was measured\n")
+    omission = {"name": "my peer", "why": "it has no licence", "is_peer": True}
     assert omission in json.loads(out)["omissions"]
+
+
+def test_a_study_without_the_peers_asked_for_names_them_and_exits_with_1(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    why = "it did not answer within 60 s"
+    left = (
+        Omission("a peer: rules", why, is_peer=True),
+        Omission("other: rules", why, is_peer=True),
+    )
+    found = replace(study(point("native", 9.0, error(0.0))), omissions=left)
+    monkeypatch.setattr(api, "bench", lambda *_, **__: found)
+    code, out, err = call("bench", "grip.yaml", "--peers", "some.py")
+    assert (code, err) == (1, "no peer of some.py was measured\n")
+    assert out.splitlines()[2] == (
+        "peers left out: a peer (rules), other (rules): it did not answer within 60 s"
+    )
+    assert "candidate" not in out.splitlines()[-2]
 
 
 @pytest.mark.heavy
