@@ -140,6 +140,7 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
         is_named: Whether the names came with the table; if not they are x1, x2, ...
         whole: All cells as one array of shape (columns, rows), where they are one.
         frame: The rows as a table of pyarrow, of a Parquet or Arrow file.
+        share: How much of the bytes of all files was read by then; 0 if unknown.
     """
 
     name: str
@@ -151,6 +152,7 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
     is_named: bool = True
     whole: FloatArray | None = None
     frame: object = None
+    share: float = 0.0
 
 
 class Table(msgspec.Struct, frozen=True, eq=False):
@@ -331,7 +333,7 @@ class LearningRows:
         chosen: The columns to learn from, if other parts of the table have set them.
         chosen_by: What has set them, for messages.
         labels: The classes so far; more are added.
-        progress: Called with the number of rows so far, and 0.
+        progress: Called with the number of rows so far, and the share that is read.
 
     Attributes:
         name: What messages call the table.
@@ -439,7 +441,8 @@ class LearningRows:
                 self._count(chosen[row], values[row])
             self.rows += piece.rows
             if self._progress is not None:
-                self._progress(f"{piece.name}: {rate_text(self.rows, begin)}", 0.0)
+                text = f"{piece.name}: {rate_text(self.rows, begin)}"
+                self._progress(text, piece.share)
             sizes = {piece.rows, len(codes)}
             if len(sizes if weights is None else sizes | {len(weights)}) > 1:
                 continue
@@ -1231,15 +1234,21 @@ def _file_pieces(
     except OSError as error:
         raise TableError(f"{path}: cannot be read: {reason(error)}") from error
     first: TablePiece | None = None
-    for file in files:
+    paths = [Path(file) for file in files]
+    sizes = [path.stat().st_size if path.is_file() else 0 for path in paths]
+    before, whole = 0, max(sum(sizes), 1)
+    for file, size in zip(files, sizes, strict=True):
         title = name if name and len(files) == 1 else file
         with _opened(file, title) as stream:
             try:
                 for piece in _stream_pieces(stream, title, delimiter, only):
                     first = first or piece
-                    yield _arranged(piece, first)
+                    place = before + (stream.tell() if size else 0)
+                    share = min(place / whole, 1.0)
+                    yield msgspec.structs.replace(_arranged(piece, first), share=share)
             except OSError as error:
                 raise TableError(f"{title}: cannot be read: {reason(error)}") from error
+        before += size
 
 
 def _files(path: str) -> list[str]:
@@ -1444,7 +1453,11 @@ def _slices(
     for number in range(file.num_record_batches):
         batch = file.get_batch(number).select(names)
         for first in range(0, batch.num_rows, rows):
-            yield batch.slice(first, rows)
+            part = batch.slice(first, rows)
+            if mapped is not None:  # the stream stands where it would without
+                share = number + (first + len(part)) / len(batch)
+                stream.seek(int(share / file.num_record_batches * len(mapped)))
+            yield part
             count += 1
             if mapped is None or count % _UNRETURNED:
                 continue

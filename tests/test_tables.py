@@ -16,8 +16,9 @@ import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from pyarrow import csv
 
-from fuzzytree import tables
+from fuzzytree import csv_rows, tables
 from fuzzytree.cells import plain
 from fuzzytree.errors import TableError
 from fuzzytree.tables import (
@@ -25,6 +26,7 @@ from fuzzytree.tables import (
     TableSource,
     batches,
     class_names,
+    pieces,
     read_table,
 )
 
@@ -675,6 +677,27 @@ def test_a_pipe_is_read_like_its_file(tmp_path: Path) -> None:
     writer.start()
     assert read_table(path, target="grip").values.shape == (2, 3)
     writer.join()
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet", "arrow"])
+def test_the_share_that_is_read_grows_up_to_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    for module in (csv_rows, tables):
+        monkeypatch.setattr(module, "BLOCK", 1 << 17)
+    data = pa.table({"x": np.arange(120_000.0), "y": np.arange(120_000.0) / 7})
+    path = tmp_path / f"t.{suffix}"
+    if suffix == "csv":
+        csv.write_csv(data, path)
+    elif suffix == "parquet":
+        pq.write_table(data, path, row_group_size=20_000)
+    else:
+        with pa.ipc.new_file(str(path), data.schema) as file:
+            file.write_table(data, max_chunksize=20_000)
+    shares = [piece.share for piece in pieces(path)]
+    assert shares == sorted(shares)
+    assert len({*shares}) > 3
+    assert 0.0 < shares[0] < 0.9 < shares[-1] <= 1.0
 
 
 @pytest.fixture

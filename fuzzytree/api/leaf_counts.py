@@ -84,7 +84,7 @@ class LeafCounts:
         Args:
             table: What `fuzzytree.table` takes. Files are read piece by piece.
             name: What messages call the part; its path unless given.
-            progress: Called with the number of rows so far, and 0.
+            progress: Called with the number of rows so far, and the share read.
 
         Raises:
             TableError: If a column is absent or holds text, or a file cannot be read;

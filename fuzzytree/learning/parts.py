@@ -198,7 +198,7 @@ class Learner:
             table: What `fuzzytree.table` takes: a path, a frame, an arrow table or
                 batch, an open file. Files are read piece by piece.
             name: What messages call the part; its path unless given.
-            progress: Called with the number of rows so far, and 0.
+            progress: Called with the number of rows so far, and the share read.
             threads: How many threads count; one for each core unless given. The tree
                 has the same bits for any number.
 
@@ -564,7 +564,7 @@ def read_or_collect(
         ignore: Columns to leave out.
         settings: How to learn.
         name: What messages call the table; its path unless given.
-        progress: Called with the number of rows so far, and 0.
+        progress: Called with the number of rows so far, and the share read.
 
     Raises:
         TableError: As `read_table`; or if a table with weights is too large to be read

@@ -165,10 +165,11 @@ def test_missing_values_are_refused_where_they_may_not_be(tmp_path: Path) -> Non
 @pytest.mark.usefixtures("low_limit")
 def test_progress_has_the_rows_so_far_and_their_speed(tmp_path: Path) -> None:
     path = written(rows_of(), tmp_path / "t.csv")
-    texts: list[str] = []
-    ft.learn(path, target="kind", progress=lambda text, _: texts.append(text))
-    reading = [text for text in texts if text.endswith("rows/s")]
-    assert reading[-1].startswith(f"{path}: {2 * PIECE + 50:,} rows, ")
+    steps: list[tuple[str, float]] = []
+    ft.learn(path, target="kind", progress=lambda *step: steps.append(step))
+    reading = [step for step in steps if step[0].endswith("rows/s")]
+    assert reading[-1][0].startswith(f"{path}: {2 * PIECE + 50:,} rows, ")
+    assert reading[-1][1] == 1.0
 
 
 EVERYDAY = (
