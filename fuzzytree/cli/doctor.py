@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import importlib.metadata
 import platform
+from pathlib import Path
 
 import click
 
-import fuzzytree
 from fuzzytree.cli.console import (
     answer,
     answer_json,
@@ -21,6 +23,7 @@ from fuzzytree.errors import (
     package_name,
     requirements,
 )
+from fuzzytree.model import version
 
 ABSENT = "not installed"
 
@@ -67,25 +70,30 @@ class DoctorOptions:
 def command(options: DoctorOptions) -> int:
     """Report versions and extras; learn, write, read and run a small model.
 
-    Exit 1 if the small model fails. The extras that only the test suite and the
+    Exit 1 if the small model fails, or if another distribution has changed or removed
+    files of the package. The extras that only the test suite and the
     benchmarks use are listed by `--verbose`.
     """
     known = packages()
     versions = {
-        "fuzzytree": fuzzytree.__version__,
+        "fuzzytree": version(),
         "python": platform.python_version(),
         **{name: _version(name) for names in known.values() for name in names},
     }
     missing = sorted(missing_extras())
-    faults = self_test("onnx" not in missing)
+    faults, mixture = self_test("onnx" not in missing), installation_faults()
+    code = 1 if faults or mixture else 0
     if options.as_json:
+        faults += mixture
         answer_json({"versions": versions, "missing": missing, "faults": faults})
-        return 1 if faults else 0
+        return code
+    for fault in mixture:
+        answer(f"installation: {fault}")
     for fault in faults:
         answer(f"self-test failed: {fault}")
     if not faults:
         answer("self-test passed: learning, writing, reading and running agree")
-    answer(f"fuzzytree {fuzzytree.__version__}, Python {platform.python_version()}")
+    answer(f"fuzzytree {version()}, Python {platform.python_version()}")
     shown = [extra for extra in known if options.verbose or extra not in FOR_TESTS]
     table = click.HelpFormatter(width=88)
     table.write_dl(
@@ -99,7 +107,7 @@ def command(options: DoctorOptions) -> int:
     for extra in missing:
         if extra in shown:
             answer(f"extra {extra!r} is not installed; it needs {install_hint(extra)}")
-    return 1 if faults else 0
+    return code
 
 
 def _version(name: str) -> str:
@@ -107,6 +115,38 @@ def _version(name: str) -> str:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
         return ABSENT
+
+
+def installation_faults() -> list[str]:
+    """Return what another distribution of the same import name does to the package.
+
+    pip writes its files over ours, and removes them when one of the two is removed.
+    """
+    own, again = "fuzzytree-toolkit", "again with pip install --force-reinstall"
+    faults: list[str] = []
+    for package in importlib.metadata.distributions():
+        if "\nfuzzytree/__init__.py," not in f"\n{package.read_text('RECORD')}":
+            continue
+        name = package.metadata["Name"]
+        if name != own:
+            faults.append(
+                f"the distribution {name!r} has a package named fuzzytree, too: pip "
+                f"uninstall {name}, then install {own} {again}"
+            )
+            continue
+        files = [file for file in package.files or () if file.parts[0] == "fuzzytree"]
+        broken = [str(file) for file in files if not _is_intact(file)]
+        if broken:
+            text = ", ".join(broken[:3])
+            faults.append(f"{text}: changed or missing; install {own} {again}")
+    return faults
+
+
+def _is_intact(file: importlib.metadata.PackagePath) -> bool:
+    path = Path(str(file.locate()))
+    digest = hashlib.sha256(path.read_bytes()).digest() if path.is_file() else b""
+    text = base64.urlsafe_b64encode(digest).decode().rstrip("=")
+    return file.hash is None or file.hash.value == text
 
 
 def self_test(has_onnx: bool) -> list[str]:

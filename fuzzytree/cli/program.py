@@ -22,7 +22,7 @@ import click
 from fuzzytree.cli.console import say
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import reason
-from fuzzytree.model import noticed, watched
+from fuzzytree.model import noticed, version, watched
 
 _OWN = (
     *("learn", "collect", "show", "export", "convert", "run", "check", "audit"),
@@ -75,9 +75,7 @@ class Verbs(click.Group):
 
 def _show_version(ctx: click.Context, _: click.Parameter, is_asked: bool) -> None:
     if is_asked:
-        import fuzzytree
-
-        click.echo(f"fuzzytree {fuzzytree.__version__}")
+        click.echo(f"fuzzytree {version()}")
         ctx.exit()
 
 

@@ -5,12 +5,17 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import json
+import sys
+from base64 import urlsafe_b64encode
+from hashlib import sha256
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fuzzytree
 from fuzzytree.checking.abilities import Ability, abilities_of
+from fuzzytree.cli.doctor import installation_faults
 from fuzzytree.exporters.table import TABLE, all_formats, find_format
 from fuzzytree.runtimes.predictions import Predictions
 from fuzzytree.runtimes.table import all_runtimes
@@ -94,3 +99,46 @@ def test_a_failed_self_test_is_exit_one(
     code, out, _ = call("doctor", "--json")
     assert code == 1
     assert json.loads(out)["faults"] == ["the tree answers other classes"]
+
+
+def _installed(site: Path, name: str, files: dict[str, bytes]) -> None:
+    """Write the metadata of a distribution with some files, and no file itself."""
+    lines = [
+        f"{file},sha256={urlsafe_b64encode(sha256(content).digest()).decode()[:-1]},"
+        for file, content in files.items()
+    ]
+    info = site / f"{name.replace('-', '_')}-0.1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(
+        f"Name: {name}\nVersion: 0.1\nRequires-Dist: numpy", "utf-8"
+    )
+    (info / "RECORD").write_text("\n".join(lines), "utf-8")
+
+
+def test_the_doctor_names_what_overwrites_or_removes_the_package(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = {
+        "fuzzytree/__init__.py": b"ours",
+        "fuzzytree/cli/__init__.py": b"",
+        "fuzzytree/gone.py": b"ours",
+    }
+    _installed(tmp_path, "fuzzytree-toolkit", own)
+    _installed(tmp_path, "fuzzytree", {"fuzzytree/__init__.py": b"theirs"})
+    _installed(tmp_path, "other", {"other/fuzzytree/__init__.py": b""})
+    (tmp_path / "fuzzytree" / "cli").mkdir(parents=True)
+    (tmp_path / "fuzzytree" / "cli" / "__init__.py").touch()
+    (tmp_path / "fuzzytree" / "__init__.py").write_bytes(b"theirs")
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    again = "install fuzzytree-toolkit again with pip install --force-reinstall"
+    faults = [
+        "the distribution 'fuzzytree' has a package named fuzzytree, too: "
+        f"pip uninstall fuzzytree, then {again}",
+        f"fuzzytree/__init__.py, fuzzytree/gone.py: changed or missing; {again}",
+    ]
+    assert sorted(installation_faults()) == sorted(faults)
+    monkeypatch.setattr("fuzzytree.cli.doctor.self_test", lambda _: [])
+    code, out, _ = call("doctor")
+    assert code == 1
+    assert {*out.splitlines()} >= {f"installation: {fault}" for fault in faults}
+    assert sorted(json.loads(call("doctor", "--json")[1])["faults"]) == sorted(faults)
