@@ -260,14 +260,13 @@ class _Run:
         """
         self.peers = {c.name for c in candidates if c.kind == "peer"}
         todo = [c for c in candidates if c.modules or c.kind == "peer"]
+        limit_s = math.inf if self.peers else self.plan.budget_s / 3
         faults = trial.tried(
             self.model,
             [c.name for c in sorted(todo, key=_rank)],
             self.values[:, :_TRIED],
             peers=self.plan.peers,
-            left=lambda: (
-                math.inf if self.peers else self.plan.budget_s / 3 - self.spent_s()
-            ),
+            left=lambda: limit_s - self.spent_s(),
             progress=_part(self.progress, 0.0, 0.1),
         )
         if self.peers:
@@ -284,8 +283,8 @@ class _Run:
         # If the time is short, what others are compared with is still there.
         for position, one in enumerate(sorted(todo, key=_rank)):
             progress(f"judging {one.name}", position / len(todo))
-            is_due = not _rank(one) or one.kind == "peer"
-            if self.spent_s() > self.plan.budget_s / 2 and not is_due:
+            is_late = self.spent_s() > self.plan.budget_s / 2
+            if is_late and _rank(one) and one.name not in self.peers:
                 why = "half of the budget was over before it was judged"
                 self.omit(one.name, f"{why}; a larger one helps")
                 continue
