@@ -7,10 +7,11 @@ each axis, are sought that keep all rivals below together, and none of ours: a d
 program over sets of rivals, one axis after another.
 
 Degrees are straight lines (`lines`). Where they are known exactly, nothing changes
-between two *critical levels*: the values at knots, and where two functions of an axis
-meet. So one level between each two of them decides. Where degrees are enclosed, or axes
-share inputs, a range of levels is asked for what may hold at any of them; if that does
-not exclude it, points are tried and the range is halved.
+between two *critical levels*: the values at knots, where two functions of an axis meet,
+and of each where another one jumps across it. So one level between each two of them
+decides. Where degrees are enclosed, or axes share inputs, a range of levels is asked
+for what may hold at any of them; if that does not exclude it, points are tried and the
+range is halved.
 
 Axes that share inputs are first treated as free of each other. If that finds nothing,
 there is nothing; otherwise linear inequalities in fractions choose among the cells.
@@ -179,9 +180,11 @@ class LevelAxis:
         result = {ZERO, ONE}
         used = sorted({one for kind in self.kinds for group in kind for one in group})
         every = list(dict.fromkeys(self.elements[one].lower for one in used))
+        jumps = [jump for one in every for jump in one.jumps()]
         for place, one in enumerate(every):
             checkpoint()
-            result |= one.values
+            values = ((one.value(x), low, high) for x, low, high in jumps)
+            result |= one.values | {y for y, low, high in values if low < y < high}
             for other in every[:place]:
                 result |= meetings(other, one)
         return tuple(sorted(level for level in result if 0 <= level <= 1))

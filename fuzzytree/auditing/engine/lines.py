@@ -80,12 +80,13 @@ class Lines(NamedTuple):
         """The least number that no value exceeds."""
         return max(self.values)
 
-    def jumps(self, place: int) -> bool:
-        """Return whether the value at a knot, by number, differs from a limit."""
-        value = self.at[place]
-        return (place > 0 and self.before[place - 1] != value) or (
-            place < len(self.after) and self.after[place] != value
-        )
+    def jumps(self) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
+        """Yield where it jumps, and the least and largest of value and limits there."""
+        left, right = (self.at[:1] + self.before), (self.after + self.at[-1:])
+        for x, *values in zip(self.x, self.at, left, right, strict=True):
+            low, high = min(values), max(values)
+            if low < high:
+                yield x, low, high
 
     def crossings(self, level: Fraction) -> Iterator[Fraction]:
         """Yield the places strictly within lines where they have a value."""

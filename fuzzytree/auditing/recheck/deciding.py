@@ -332,19 +332,26 @@ def apart(case: Case, answer: Answer) -> None:
     ]
     omitted = answer.measure("pairs not listed")
     counted(answer, pairs_that_never_do=len(rest) - omitted)
-    together = []
+    together, limits = [], 0
     for pair in rest:
         if case.rules.is_product:
             is_met = case.beats(pair, (), low=level)
         else:
             is_met = case.refined(functools.partial(_meet, pair, level))
+            limits += is_met and _highest(pair, case.cells(STEPS[0])) == level
         together += [pair] if is_met else []
+    if len(together) - limits <= omitted < len(together):
+        raise UndecidedError("a level that degrees may reach only as a limit")
     text = f"{together[:3]} reach the level together" if together else "fewer do"
     require(len(together) == omitted, text)
 
 
 def _meet(pair: tuple[int, int], level: Fraction, cells: Cells) -> bool:
-    return cells.highest(*(cells.of[n - 1] for n in pair)) >= level
+    return _highest(pair, cells) >= level
+
+
+def _highest(pair: tuple[int, int], cells: Cells) -> Fraction:
+    return cells.highest(*(cells.of[n - 1] for n in pair))
 
 
 def top(case: Case, answer: Answer) -> None:

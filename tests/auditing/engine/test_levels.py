@@ -1,4 +1,4 @@
-"""Levels that coincide are one level, and near ones are two."""
+"""Levels that coincide are one level, near ones are two, and none is missed."""
 
 from __future__ import annotations
 
@@ -46,6 +46,17 @@ def _rules(*, is_mirrored: bool, drop: float = 1.0) -> RuleBase:
             Rule((Proposition("y", ("square", "line")),), "b"),
         ),
     )
+
+
+def test_a_rule_wins_between_the_values_of_a_slope_where_its_rival_jumps() -> None:
+    slope, step = Points((0.2, 1.0), (1.0, 0.0)), Band(low=0.3)
+    x = Variable("x", (Term("slope", slope), Term("step", step)))
+    y = Variable("y", (Term("line", Points((0.0, 1.0), (0.0, 1.0))),))
+    asked = (("x", "slope", "a"), ("x", "step", "c"), ("y", "line", "b"))
+    made = (Rule((Proposition(name, (term,)),), then) for name, term, then in asked)
+    rules = RuleBase("jump", ("a", "b", "c"), (x, y), tuple(made))
+    # At x = 0.3 the slope has 0.875, and the step is still 0.
+    assert isinstance(wins(arrange(rules, SQUARE), 3, (1, 2)), Witness)
 
 
 def _found(rules: RuleBase) -> object:
