@@ -154,7 +154,12 @@ def decoded(
         return content.decode("latin-1"), ("the file is not UTF-8; read as Latin-1",)
 
 
-def check_characters(text: str, name: str, forbidden: re.Pattern[str]) -> None:
+def check_characters(
+    text: str,
+    name: str,
+    forbidden: re.Pattern[str],
+    why: str = "is not allowed here; the file may be damaged",
+) -> None:
     """Refuse a text with a character that no such file has.
 
     Raises:
@@ -162,8 +167,7 @@ def check_characters(text: str, name: str, forbidden: re.Pattern[str]) -> None:
     """
     match = forbidden.search(text)
     if match:
-        code = f"U+{ord(match.group()):04X}"
-        sentence = f"the character {code} is not allowed here; the file may be damaged"
+        sentence = f"the character U+{ord(match.group()):04X} {why}"
         raise report(name, [(*position_behind(text[: match.start()]), sentence)])
 
 

@@ -413,6 +413,13 @@ def test_lines_end_as_three_systems_end_them(end: str) -> None:
     assert _system(FUZZYLITE.replace("\n", end)) == _system(FUZZYLITE)
 
 
+@pytest.mark.parametrize("mark", ["\x0b", "\x0c", "\x85", "\u2028", "\u2029"])
+def test_only_cr_and_lf_end_a_comment(mark: str) -> None:
+    hidden = f"// what to give{mark}; END_VAR"
+    text = JFUZZYLOGIC.replace("// what to give", hidden)
+    assert _system(text) == _system(JFUZZYLOGIC)
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
 def test_other_encodings_are_read(encoding: str) -> None:
     text = STANDARD.replace("A file", "Un fichier français")

@@ -85,6 +85,12 @@ def read(text: str, dialect: Dialect | None = None) -> FuzzySystem:
     return model
 
 
+@pytest.mark.parametrize("mark", ["\x85", "\u2028", "\u2029"])
+def test_only_cr_and_lf_end_a_comment(mark: str) -> None:
+    hidden = f"% a comment{mark}[Output2]"
+    assert read(SUGENO.replace("% a comment", hidden)) == read(SUGENO)
+
+
 def test_a_sugeno_system_is_read_whole() -> None:
     system = read(SUGENO)
     assert system.inputs == ("food", "service")

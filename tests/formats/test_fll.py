@@ -97,6 +97,12 @@ def system_of(text: str) -> FuzzySystem:
     return model
 
 
+@pytest.mark.parametrize("mark", ["\x0b", "\x0c", "\x85", "\u2028", "\u2029"])
+def test_only_cr_and_lf_end_a_comment(mark: str) -> None:
+    hidden = f"# A comment{mark}OutputVariable: more"
+    assert system_of(TIPPER.replace("# A comment", hidden)) == system_of(TIPPER)
+
+
 def test_every_word_of_a_file_is_in_the_system() -> None:
     reading = read_fll(TIPPER.encode(), "tipper.fll")
     system = reading.model

@@ -77,6 +77,25 @@ def test_what_is_no_single_document_of_text_is_refused(
     assert str(caught.value) == message
 
 
+@pytest.mark.parametrize("mark", ["\x85", "\u2028", "\u2029"])
+@pytest.mark.parametrize("text", ["# reviewed{}- if: []", "'a{}b'", "a{}b"])
+def test_a_line_end_of_yaml_1_1_alone_is_refused_wherever_it_stands(
+    text: str, mark: str
+) -> None:
+    with pytest.raises(ReadError) as caught:
+        compose(f"# é\r\n{text.format(mark)}\n- c".encode(), "x.yaml")
+    assert str(caught.value) == (
+        f"x.yaml:2:{text.index('{') + 1}: the character U+{ord(mark):04X} ends a line "
+        "in YAML 1.1 and not in YAML 1.2; leave it out, or write it as an escape in "
+        "double quotes"
+    )
+
+
+def test_an_escaped_line_end_of_yaml_1_1_is_text() -> None:
+    root, _ = compose(rb'"a\u2028b\x85\u2029"', "x.yaml")
+    assert root == Scalar("a\u2028b\x85\u2029", False, 1, 1)
+
+
 def test_a_file_beyond_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(nodes, "MOST_BYTES", 10)
     with pytest.raises(ReadError) as caught:

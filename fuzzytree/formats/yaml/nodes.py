@@ -86,6 +86,8 @@ _NUMBER = re.compile(
 _FORBIDDEN = re.compile(
     "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 )
+_OLD_LINE_ENDS = re.compile("[\x85\u2028\u2029]")
+"""PyYAML ends a line, and a comment, at them; YAML 1.2 does not."""
 
 
 def meaning(scalar: Scalar) -> Meaning:
@@ -174,6 +176,13 @@ def _decoded(content: bytes, name: str) -> str:
         sentence = f"{byte}; the file must be saved as UTF-8"
         raise report(name, [(*position_behind(before), sentence)]) from error
     check_characters(text, name, _FORBIDDEN)
+    check_characters(
+        text,
+        name,
+        _OLD_LINE_ENDS,
+        "ends a line in YAML 1.1 and not in YAML 1.2; leave it out, or write it as an "
+        "escape in double quotes",
+    )
     return text
 
 
