@@ -52,6 +52,25 @@ def test_an_example_to_refuse_gives_the_message_beside_it(path: Path) -> None:
     assert f"{caught.value}\n" == path.with_suffix(".txt").read_text("utf-8")
 
 
+@pytest.mark.parametrize(
+    ("wrong", "key"), [("conjunction", "and"), ("disjunction", "or")]
+)
+def test_the_python_word_for_an_operator_gets_the_key_as_a_hint(
+    wrong: str, key: str
+) -> None:
+    lines = RULES.split("\n")
+    line = next(k for k, one in enumerate(lines, 1) if one.startswith(f"  {key}: "))
+    head = lines.index("semantics:") + 2
+    choice = "and, or, not, uncovered, missing, label type, sharpness, floor, answer"
+    reports = [
+        f"x.yaml:{head}:3: the semantics of rules needs '{key}'",
+        f"x.yaml:{line}:3: the semantics of rules has no key '{wrong}'; "
+        f"there is {choice} (did you mean '{key}'?)",
+    ]
+    lines[line - 1] = lines[line - 1].replace(key, wrong, 1)
+    assert error_of("\n".join(lines)) == "\n".join(sorted(reports))
+
+
 def test_words_of_yaml_1_1_are_the_names_that_they_look_like() -> None:
     path = EXAMPLES / "positive" / "by-hand-switches.yaml"
     rules = read_yaml(path.read_bytes(), path.name).model

@@ -329,7 +329,9 @@ def shortened(text: str) -> str:
 
 def _choice(wrong: str, known: Iterable[str], *, has_hint: bool) -> str:
     names = list(known)
-    close = difflib.get_close_matches(wrong[:100], names, n=1) if has_hint else []
+    close = [name for name in _KEYS.get(wrong, ()) if name in names]
+    if has_hint and not close:
+        close = difflib.get_close_matches(wrong[:100], names, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     return f"there is {', '.join(names)}{hint}"
 
@@ -337,6 +339,8 @@ def _choice(wrong: str, known: Iterable[str], *, has_hint: bool) -> str:
 _KEYS: Final = {
     # What a field of the model is called in the file, where the words differ.
     "when": ("if",),
+    "conjunction": ("and",),
+    "disjunction": ("or",),
     "parts": ("sum of",),
     "low": ("range",),
     "high": ("range",),
