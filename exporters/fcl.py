@@ -300,12 +300,6 @@ def _remarks(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator
             "fuzzylite 6 treats values within 1e-6 as equal, and does not fire rules "
             "of a lower degree"
         )
-    is_curved = any(not one.defuzzifier.is_weighted for one in system.outputs)
-    if words.name == "jfuzzylogic" and is_curved:
-        yield (
-            "jFuzzyLogic samples the low ends of 1000 pieces of a range, not their "
-            "middles: its outputs are up to half a piece lower"
-        )
     if words.name == "portable" and any(
         Or in joints(rule.when) for rule in system.rules
     ):

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import WordsOf, has_not, hedge_losses, rule_text
+from fuzzytree.exporters.fuzzy_files import grid_losses
 from fuzzytree.formats import (
     ALWAYS,
     DEFUZZIFIERS,
@@ -190,16 +191,8 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
             yield Loss(f"input {one.name!r}", "its values are not clamped to its range")
     for output in system.outputs:
         where = f"output {output.name!r}"
-        how = output.defuzzifier
-        if not how.is_weighted and (how.samples, how.grid) != (
-            default.samples,
-            default.grid,
-        ):
-            yield Loss(
-                where,
-                f"{how.samples} values of its range are sampled; FCL does not say "
-                f"how many, {words.name} means {default.samples}",
-            )
+        whose = f"FCL does not say so; {words.name} takes"
+        yield from grid_losses(output, default, whose)
         if output.clips and words.name != "fuzzylite":
             yield Loss(where, "its value is not clamped to its range")
         has_default = output.default is not None or words.name == "fuzzylite"

@@ -17,6 +17,7 @@ from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
 from fuzzytree.exporters.fuzzy_files import (
     TITLE,
     FileNames,
+    grid_losses,
     refuse,
     without_heights,
 )
@@ -197,16 +198,8 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
         if how.method != first.defuzzifier.method:
             what = f"{how.method} becomes {first.defuzzifier.method}, as of the first"
             yield Loss(where, what)
-        usual = DEFAULTS[dialect]
-        if not how.is_weighted and (how.samples, how.grid) != (
-            usual.samples,
-            usual.grid,
-        ):
-            yield Loss(
-                where,
-                f"its curve is sampled at {how.samples} values ({how.grid}), and FIS "
-                f"does not say so; {dialect} takes {usual.samples} ({usual.grid})",
-            )
+        whose = f"FIS does not say so; {dialect} takes"
+        yield from grid_losses(output, DEFAULTS[dialect], whose)
         if output.aggregation != first.aggregation:
             yield Loss(where, f"joined by {first.aggregation}, as of the first output")
         elif how.is_weighted and output.aggregation and dialect != "octave":

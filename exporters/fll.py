@@ -22,7 +22,7 @@ from fuzzytree.exporters.fll_text import (
     speakable,
     weighted_type,
 )
-from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
+from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, grid_losses, refuse
 from fuzzytree.formats import (
     ACTIVATIONS,
     FLL_METHODS,
@@ -157,13 +157,8 @@ def _is_known(variable: Variable | SystemOutput, term: Term) -> bool:
 def _losses(system: FuzzySystem) -> Iterator[Loss]:
     """Yield what outputs depend on and FLL cannot express."""
     for output in system.outputs:
-        how = output.defuzzifier
-        if not how.is_weighted and how.grid != "middle":
-            yield Loss(
-                f"output {output.name!r}",
-                f"its curve is sampled in the middle of {how.samples} pieces of the "
-                f"range, and not at {how.samples} values with the ends",
-            )
+        usual = replace(output.defuzzifier, grid="middle")
+        yield from grid_losses(output, usual, "FLL knows only")
     yield from hedge_losses(system.rules)
 
 

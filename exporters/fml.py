@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 from fuzzytree.exporters.fml_rules import FmlRule, FmlRules
-from fuzzytree.exporters.fuzzy_files import FileNames, without_heights
+from fuzzytree.exporters.fuzzy_files import FileNames, grid_losses, without_heights
 from fuzzytree.exporters.xml_text import XmlElement, element, text_element, text_of
 from fuzzytree.formats import (
     FML_METHODS,
@@ -181,15 +181,7 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
             yield Loss(where, what)
         if how.is_weighted:
             continue
-        has_grid = not all(
-            isinstance(label.function, Singleton) for label in output.terms
-        )
-        if has_grid and (how.samples, how.grid) != (USUAL.samples, USUAL.grid):
-            yield Loss(
-                where,
-                f"its curve is sampled at {how.samples} values ({how.grid}), and FML "
-                f"does not say so; it is read as {USUAL.samples} ({USUAL.grid})",
-            )
+        yield from grid_losses(output, USUAL, "FML does not say so; it is read as")
         if output.aggregation not in FML_SNORMS.values():
             yield Loss(where, f"FML has no {output.aggregation}; MAX stands for it")
     for variable in system.all_variables:

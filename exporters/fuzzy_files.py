@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import msgspec
 from msgspec.structs import replace
@@ -11,6 +11,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.model import (
     And,
     Condition,
+    Defuzzifier,
     FuzzySystem,
     Linear,
     Loss,
@@ -109,6 +110,30 @@ def without_heights(system: FuzzySystem, to: str, losses: list[Loss]) -> FuzzySy
         return Term(label.name, Points(label.function.values, degrees))
 
     return with_labels(system, lambda v: [scaled(v, one) for one in v.terms])
+
+
+def grid_losses(output: SystemOutput, usual: Defuzzifier, whose: str) -> Iterator[Loss]:
+    """Yield that a file does not say where an output's curve is sampled.
+
+    Args:
+        output: The output.
+        usual: The samples and the grid that the file stands for.
+        whose: The format, and who takes these.
+    """
+    how = output.defuzzifier
+    has_curve = not all(isinstance(one.function, Singleton) for one in output.terms)
+    own, other = (how.samples, how.grid), (usual.samples, usual.grid)
+    if how.is_weighted or own == other or not has_curve:
+        return
+    what = (
+        f"its curve is sampled at {how.samples} values ({how.grid}), and {whose} "
+        f"{usual.samples} ({usual.grid})"
+    )
+    if how.samples == usual.samples and {*own, *other} >= {"middle", "low ends"}:
+        half = ((output.high or 0.0) - (output.low or 0.0)) / (2 * how.samples)
+        way = "higher" if usual.grid == "middle" else "lower"
+        what += f", each half a piece ({half:.3g}) {way}"
+    yield Loss(f"output {output.name!r}", what)
 
 
 def operands(condition: Condition, block: RuleBlock) -> list[Condition]:

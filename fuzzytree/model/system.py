@@ -66,7 +66,7 @@ DefuzzifierMethod = Literal[
     "weighted average",
     "weighted sum",
 ]
-Grid = Literal["middle", "ends", "half ends", "lines"]
+Grid = Literal["middle", "low ends", "ends", "half ends", "lines"]
 
 
 class Defuzzifier(Value, frozen=True):
@@ -84,8 +84,9 @@ class Defuzzifier(Value, frozen=True):
     Attributes:
         method: The method.
         samples: At how many values; of no meaning for weighted ones.
-        grid: `middle`: in the middle of as many equal pieces of the range. `ends`: the
-            first at its low end and the last at its high end. `half ends`: like
+        grid: `middle`: in the middle of as many equal pieces of the range. `low ends`:
+            at the low end of each piece (as in jFuzzyLogic). `ends`: the first at the
+            range's low end and the last at its high end. `half ends`: like
             `ends`, and the first and the last count half in areas (the trapezoidal
             rule); of no other meaning for maxima. `lines`: like `ends`, and between
             neighbours each label's curve is a line; the aggregated curve joins its
@@ -107,8 +108,9 @@ class Defuzzifier(Value, frozen=True):
 def sampled_values(output: SystemOutput) -> list[float]:
     """Return the values at which an output's curve is sampled.
 
-    `middle`: low + (k + 1/2) step with step = (high - low) / n. `ends` and `half ends`:
-    low + k step with step = (high - low) / (n - 1), and `high` itself as the last.
+    `middle`: low + (k + 1/2) step with step = (high - low) / n. `low ends`: low + k
+    step. `ends` and `half ends`: low + k step with step = (high - low) / (n - 1), and
+    `high` itself as the last.
 
     The value of a singleton is a sample as well; no other value could show it. Where
     all terms are singletons, with two or more values, these are the only samples.
@@ -129,9 +131,10 @@ def sampled_values(output: SystemOutput) -> list[float]:
         return sorted(singles)
     low, high = output.low or 0.0, output.high or 0.0
     count = output.defuzzifier.samples
-    if output.defuzzifier.grid == "middle":
+    if output.defuzzifier.grid in ("middle", "low ends"):
         step = (high - low) / count
-        values = [low + (k + 0.5) * step for k in range(count)]
+        shift = 0.5 if output.defuzzifier.grid == "middle" else 0.0
+        values = [low + (k + shift) * step for k in range(count)]
     else:
         step = (high - low) / (count - 1)
         values = [*(low + k * step for k in range(count - 1)), high]

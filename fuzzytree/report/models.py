@@ -371,6 +371,7 @@ def rule_text(rule: SystemRule) -> str:
 
 _GRIDS = {
     "middle": "in the middle of equal pieces",
+    "low ends": "at the low ends of equal pieces",
     "ends": "from end to end",
     "half ends": "from end to end, by the trapezoidal rule",
     "lines": "from end to end, joined by lines",

@@ -325,6 +325,7 @@ SAMPLES: Mapping[str, Callable[[], Document]] = {
     "Mamdani, mean of maximum": lambda: _mamdani(Defuzzifier("mean of maximum")),
     "Mamdani, singletons": _singletons,
     "number of samples": lambda: _mamdani(Defuzzifier("centroid", samples=777)),
+    "samples at low ends": lambda: _mamdani(Defuzzifier("centroid", 1000, "low ends")),
     "weights of rules": lambda: _sugeno(*_two(0.75)),
     "hedges": lambda: _sugeno(
         _two()[0],

@@ -255,8 +255,34 @@ def test_a_portable_file_refuses_curves_of_outputs_with_the_reason() -> None:
 
 
 def test_another_number_of_samples_is_a_loss() -> None:
-    with pytest.raises(LossError, match="777 values of its range are sampled"):
+    with pytest.raises(LossError) as caught:
         write(_sample("number of samples"), dialect="fuzzylite")
+    assert str(caught.value) == (
+        "cannot write fan as fcl (fuzzylite) without loss:\n"
+        "  output 'fan': its curve is sampled at 777 values (middle), and FCL does not "
+        "say so; fuzzylite takes 100 (middle)\n"
+        "  pass allow_loss=True to write it as stated"
+    )
+
+
+def test_low_ends_of_pieces_are_jfuzzylogics_and_stay_so() -> None:
+    system = _sample("samples at low ends")
+    assert isinstance(system, FuzzySystem)
+    system = replace(system, outputs=(replace(system.outputs[0], default=0.0),))
+    content = write(system, dialect="jfuzzylogic").content
+    again = read_fcl(content, "x.fcl").model
+    assert isinstance(again, FuzzySystem)
+    assert again.outputs == system.outputs
+    middle = Defuzzifier("centroid", 1000)
+    system = replace(system, outputs=(replace(system.outputs[0], defuzzifier=middle),))
+    with pytest.raises(LossError) as caught:
+        write(system, dialect="jfuzzylogic")
+    assert str(caught.value) == (
+        "cannot write fan as fcl (jfuzzylogic) without loss:\n"
+        "  output 'fan': its curve is sampled at 1000 values (middle), and FCL does not "
+        "say so; jfuzzylogic takes 1000 (low ends), each half a piece (0.0025) lower\n"
+        "  pass allow_loss=True to write it as stated"
+    )
 
 
 def test_the_strongest_rule_alone_is_refused() -> None:

@@ -268,8 +268,8 @@ def test_what_is_lost_is_listed_and_refused() -> None:
         "  term 'low' of 'a': it becomes 11 points joined by lines (largest "
         "error 0.0083)",
         "  combination 'b': it is an input, to be given as 2.0 * ('a' - 0.5)",
-        "  output 'y': its curve is sampled in the middle of 101 pieces of the "
-        "range, and not at 101 values with the ends",
+        "  output 'y': its curve is sampled at 101 values (ends), and FLL knows only "
+        "101 (middle)",
         "  rule 1: FLL has no 'cubed': left out",
         "  pass allow_loss=True to write it as stated",
     ]

@@ -14,6 +14,7 @@ from fuzzytree.model import (
     Call,
     Cosine,
     Curve,
+    Defuzzifier,
     Formula,
     FuzzySystem,
     Gaussian,
@@ -326,13 +327,23 @@ def test_a_file_of_jfuzzylogic_is_read_with_its_shapes_and_defaults() -> None:
     tip = system.outputs[0]
     assert (tip.low, tip.high) == (1.0, 20.0)  # 5 - 4 deviations, and 20
     assert tip.aggregation == "sum"
-    assert tip.defuzzifier.samples == 1000
+    assert tip.defuzzifier == Defuzzifier("centroid", 1000, "low ends")
     assert system.blocks[0].conjunction == "product"
     assert system.blocks[0].implication == "minimum"
     assert system.rules[1].when == Not(
         Or((Proposition("food", ("bad",)), Proposition("food", ("fair",))))
     )
     assert [loss.where for loss in reading.losses] == ["the other function blocks"]
+
+
+def test_jfuzzylogic_samples_the_low_ends_of_a_thousand_pieces() -> None:
+    text = JFUZZYLOGIC.replace("TRIAN 10 15 20", "(0, 0) (10, 1)")
+    text = text.replace("IF NOT (food IS bad OR food IS fair)", "IF food IS good")
+    text = text.replace(" WITH 0.5", "").replace("IF food IS bad", "IF food IS fair")
+    text = text.replace("METHOD : COG;", "METHOD : COG; RANGE := (0 .. 10);")
+    # One curve, x / 10, whole: sum(x x) / sum(x) of x = 0, 0.01 ... 9.99.
+    (answer,) = infer(_system(text), {"food": 100.0}).outputs
+    assert answer == pytest.approx(0.01 * (2 * 1000 - 1) / 3, rel=1e-13)
 
 
 def test_an_or_before_an_and_is_reported_in_a_file_of_jfuzzylogic() -> None:

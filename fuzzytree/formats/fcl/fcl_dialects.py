@@ -53,7 +53,7 @@ DEFUZZIFIERS: Mapping[Dialect, Defuzzifier] = {
     "portable": Defuzzifier("centroid", 1000),
     "iec": Defuzzifier("centroid", 1000),
     "fuzzylite": Defuzzifier("centroid", 100),
-    "jfuzzylogic": Defuzzifier("centroid", 1000),
+    "jfuzzylogic": Defuzzifier("centroid", 1000, "low ends"),
     "pyit2fls": Defuzzifier("centroid", 100, "ends"),
 }
 """At how many values an engine of each dialect looks; a file does not say it."""

@@ -435,10 +435,10 @@ def _defuzzifier(name: str, block: FclBlock, known: FclVariables) -> Defuzzifier
     if method in ("weighted average", "weighted sum"):
         return Defuzzifier(method)
     result = replace(default, method=method)
-    text = f"output {name!r}: {result.samples} values of its range are looked at"
-    if known.dialect == "jfuzzylogic":
-        text += "; jFuzzyLogic takes the low ends of as many pieces, and not the middle"
-    known.notes.remark(text)
+    known.notes.remark(
+        f"output {name!r}: {result.samples} values of its range are looked at "
+        f"({result.grid})"
+    )
     return result
 
 

@@ -479,10 +479,10 @@ def samples_of(make: Maker, output: SystemOutput) -> Place:
     low, high = output.low or 0.0, output.high or 0.0
     count = output.defuzzifier.samples
     index, start = make.index(count), make.constant(low)
-    if output.defuzzifier.grid == "middle":
+    if output.defuzzifier.grid in ("middle", "low ends"):
         step = make.constant((high - low) / count)
-        middle = index + 0.5
-        return start + (middle * step)
+        place = index + 0.5 if output.defuzzifier.grid == "middle" else index
+        return start + (place * step)
     step = make.constant((high - low) / (count - 1))
     value = start + (index * step)
     is_last = make.equal(index, float(count - 1))
