@@ -38,7 +38,7 @@ def _bars_mean(tree: FuzzyTree, passed: Passing | None) -> str:
             said += f"; {counted(passed.missing, 'row')} with a missing value left out"
         return said
     if all(leaf.support is not None for leaf in tree.leaves):
-        return "The bar in a box shows training rows, by the class of their leaf"
+        return "A branch is the thicker the more training rows took it"
     return "How many rows reach the leaves is not known"
 
 

@@ -1,8 +1,9 @@
-"""Accuracy over the number of leaves, a line for each number of columns a node."""
+"""Accuracy over the number of leaves, a line for each number of columns per node."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 from fuzzytree.report.drawing import Scale, path_of
@@ -15,12 +16,14 @@ if TYPE_CHECKING:
 
 _WIDE, _HIGH = 460.0, 330.0
 _LEFT, _RIGHT, _TOP, _BASE = 50.0, 350.0, 50.0, 276.0
+_LETTERING = 13.0  # points from one line of words to the next
 _COLOURS = ("#2458b3", "#b3482b", "#4a7a2e", "#5b4a8a")
 _RULES = """
 .axis { fill: none; stroke: #595d66; }
 .majority { fill: none; stroke: #9aa0aa; stroke-dasharray: 4 3; }
 """ + "".join(
     f".line{k} {{ fill: none; stroke: {colour}; stroke-width: 2; }}\n"
+    f".name{k} {{ fill: {colour}; }}\n"
     for k, colour in enumerate(_COLOURS)
 )
 
@@ -42,13 +45,13 @@ def draw_front(front: Front, *, title: str = "") -> Picture:
     margin = max(0.02, 0.05 * (high - low))
     y = Scale(max(0.0, low - margin), min(1.0, high + margin), _BASE, _TOP)
     x = Scale(min(front.leaves), max(front.leaves) + 1e-9, _LEFT, _RIGHT)
-    facts = f"on {counted(front.rows, 'row')} held out, by columns a node"
+    facts = f"on {counted(front.rows, 'row')} held out, by columns per node"
     marks = [
         mark("words", 10, 20, heading, "strong"),
         mark("words", 10, 38, facts, "small"),
         *_axes(front, x, y),
     ]
-    places: list[float] = []
+    places = _apart([y.at(row[-1]) for row in front.accuracy])
     for number, (columns, row) in enumerate(
         zip(front.columns, front.accuracy, strict=True)
     ):
@@ -56,13 +59,25 @@ def draw_front(front: Front, *, title: str = "") -> Picture:
             (x.at(k), y.at(share)) for k, share in zip(front.leaves, row, strict=True)
         ]
         marks.append(mark("path", path_of(points), f"line{number}"))
-        place = points[-1][1]
-        while any(abs(place - other) < 13 for other in places):
-            place -= 13
-        places.append(place)
         word = "all columns" if columns is None else counted(columns, "column")
-        marks.append(mark("words", _RIGHT + 8, place + 4, word, "small"))
+        look = f"small name{number}"
+        marks.append(mark("words", _RIGHT + 8, places[number] + 4, word, look))
     return picture(marks, _WIDE, _HIGH, f"{heading} {facts}", _RULES)
+
+
+def _apart(places: Sequence[float]) -> dict[int, float]:
+    """Return a place near each of those, by its number, a line of words apart.
+
+    Places that are too close become a group, which lies around their mean.
+    """
+    order = sorted(range(len(places)), key=lambda number: places[number])
+    groups: list[list[float]] = []
+    for rank, number in enumerate(order):
+        groups.append([places[number] - _LETTERING * rank])
+        while len(groups) > 1 and fmean(groups[-2]) > fmean(groups[-1]):
+            groups[-2:] = [groups[-2] + groups[-1]]
+    means = [fmean(group) for group in groups for _ in group]
+    return {k: means[rank] + _LETTERING * rank for rank, k in enumerate(order)}
 
 
 def _axes(front: Front, x: Scale, y: Scale) -> Iterator[Markup]:

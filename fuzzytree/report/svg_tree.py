@@ -36,9 +36,9 @@ _STYLE = """
 class Box(msgspec.Struct):
     """A node or a leaf, the branch that leads to it, and where it stands.
 
-    The code is the number of a leaf's class, None for a node; the counts are the rows
-    that reach it by class, empty if they are not known; its middle is in points below
-    the top.
+    The code is the number of a leaf's class, None for a node; the rows are those that
+    reach it, and the counts are these by class, where they are known; its middle is in
+    points below the top.
     """
 
     level: int
@@ -46,6 +46,7 @@ class Box(msgspec.Struct):
     note: str
     branch: str = ""
     code: int | None = None  # of the class of a leaf
+    rows: int | None = None
     counts: Counts = ()
     middle: float = 0.0
     above: Box | None = None
@@ -60,9 +61,8 @@ class Box(msgspec.Struct):
 def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
     """Return a tree from left to right.
 
-    A box holds a bar: the rows that pass, by their class; without rows the training
-    rows of the leaves behind it, by the leaves' class. A branch is the thicker the
-    more of them take it.
+    With rows, a box holds a bar: the rows that pass, by their class. A branch is the
+    thicker the more rows take it; without rows, the more training rows.
     """
     drawn, wide, high = _laid(boxes_of(tree, rows))
     desc = (
@@ -126,7 +126,7 @@ def _laid(boxes: Sequence[Box]) -> tuple[list[Markup], float, float]:
     """Return boxes with their branches, and the width and height of all."""
     high = placed(boxes)
     wide = max(box.left for box in boxes) + _WIDE + _EDGE
-    whole = sum(boxes[0].counts)
+    whole = boxes[0].rows or 0
     drawn = [_branch(box, whole) for box in boxes if box.above is not None]
     return [*drawn, *map(_drawn, boxes)], wide, high
 
@@ -149,7 +149,8 @@ def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
             tested = tree.nodes[node - 1]
             cuts = ", ".join(map(number, tested.cuts))
             box = Box(level, f"{tested.variable}?", f"cut at {cuts}", branch)
-            box.counts = rows.nodes[node - 1] if rows else ()
+            if rows:
+                _count(box, rows.nodes[node - 1])
             todo += [
                 (one.node, one.leaf, _branch_words(tested, place), box)
                 for place, one in reversed([*enumerate(tested.branches)])
@@ -158,14 +159,10 @@ def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
             position = leaf or 1
             end = tree.leaves[position - 1]
             box = Box(level, end.pattern or end.label, "", branch, codes[end.label])
+            box.rows = end.support
             if rows:
-                box.counts = rows.leaves[position - 1]
-            elif end.support is not None:
-                box.counts = tuple(
-                    end.support * (code == box.code) for code in codes.values()
-                )
-            reached = counted(sum(box.counts), "row") if box.counts else ""
-            box.note = f"rule {position}" + (f", {reached}" if reached else "")
+                _count(box, rows.leaves[position - 1])
+            box.note = ", ".join(filter(None, [f"rule {position}", _rows_text(box)]))
         box.above = above
         if above:
             above.below.append(box)
@@ -174,12 +171,16 @@ def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
     return boxes
 
 
+def _count(box: Box, counts: Counts) -> None:
+    box.rows, box.counts = sum(counts), counts
+
+
 def _add_up(boxes: Sequence[Box]) -> None:
-    """Give each node without counts those of the leaves behind it."""
+    """Give each node whose rows are not known those of the leaves behind it."""
     for box in reversed(boxes):
-        if not box.counts and box.below and all(one.counts for one in box.below):
-            columns = zip(*(one.counts for one in box.below), strict=True)
-            box.counts = tuple(map(sum, columns))
+        reached = [below.rows for below in box.below if below.rows is not None]
+        if box.rows is None and box.below and len(reached) == len(box.below):
+            box.rows = sum(reached)
 
 
 def _branch_words(node: Node, place: int) -> str:
@@ -202,7 +203,7 @@ def placed(boxes: Sequence[Box]) -> float:
 def _branch(box: Box, whole: int) -> Markup:
     above = box.above
     assert above is not None  # the root has no branch
-    share = sum(box.counts) / whole if whole else 0.0
+    share = (box.rows or 0) / whole if whole else 0.0
     start, end = above.left + _WIDE, box.left
     bend = (start + end) / 2.0
     way = f"M{start:.1f} {above.middle:.1f}C{bend:.1f} {above.middle:.1f} "
@@ -217,7 +218,8 @@ def _drawn(box: Box) -> Markup:
     own = f" {class_mark(box.code or 0)}" if is_leaf else ""
     rx = 14.0 if is_leaf else 4.0
     room = (_WIDE - 20.0) / (LETTER * 13.0)
-    said = [box.branch, box.title, box.note, _counts_text(box.counts)]
+    rows = "" if is_leaf else _rows_text(box)
+    title = [box.branch, box.title, box.note, rows, _counts_text(box.counts)]
     marks = [
         mark("rect", left, top, _WIDE, _HIGH, f"box{own}", rx),
         mark("words", left + 2, top - 6, cut(box.branch, _WIDE / 6.1), "small"),
@@ -225,7 +227,11 @@ def _drawn(box: Box) -> Markup:
         mark("words", left + 10, top + 33, cut(box.note, _WIDE / 6.4), "small"),
         *_bar(box.counts, left + 10, top + 40, _WIDE - 20),
     ]
-    return mark("group", marks, "; ".join(filter(None, said)))
+    return mark("group", marks, "; ".join(filter(None, title)))
+
+
+def _rows_text(box: Box) -> str:
+    return "" if box.rows is None else counted(box.rows, "row")
 
 
 def _counts_text(counts: Counts) -> str:
@@ -233,9 +239,10 @@ def _counts_text(counts: Counts) -> str:
 
 
 def _bar(counts: Counts, left: float, top: float, wide: float) -> Iterator[Markup]:
-    """Yield the parts of a bar, the rows of each class."""
+    """Yield the parts of a bar, the rows of each class; none if they are unknown."""
     whole = sum(counts)
-    yield mark("rect", left, top, wide, 6.0, "track")
+    if counts:
+        yield mark("rect", left, top, wide, 6.0, "track")
     for code, count in enumerate(counts):
         if count:
             part = wide * count / whole

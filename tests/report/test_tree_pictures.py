@@ -67,9 +67,17 @@ def test_a_tree_of_one_leaf_is_that_leaf() -> None:
 
 def test_a_node_has_the_rows_of_all_that_is_below_it() -> None:
     boxes = boxes_of(learnt(7), None)
-    assert sum(boxes[0].counts) == 7 * 12
-    for box in (one for one in boxes if one.below):
-        assert sum(box.counts) == sum(sum(one.counts) for one in box.below)
+    assert boxes[0].rows == 7 * 12
+    for box in (node for node in boxes if node.below):
+        assert box.rows == sum(below.rows or 0 for below in box.below)
+
+
+def test_a_tree_drawn_without_rows_shows_no_classes_of_the_rows_of_a_box() -> None:
+    tree = slanted()
+    picture = draw_tree(tree).svg
+    assert "rows by class" not in picture
+    assert 'class="bar' not in picture
+    assert "cut at 0; 80 rows" in picture  # of the node, for readers of a screen
 
 
 def test_a_tree_without_known_rows_is_drawn_without_them() -> None:
