@@ -17,6 +17,7 @@ from fuzzytree.model import (
     Model,
     RuleBase,
     Shape,
+    Variable,
     label_of,
     proposition_text,
     shapes_of,
@@ -314,6 +315,8 @@ def predictions_of(
 def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> list[str]:
     """Return, for each row, its rule as a sentence with the degree of each proposition.
 
+    A value that stands for a missing one is named after it.
+
     `values` has shape (inputs, rows), in the order of `rules.inputs`.
 
     Example:
@@ -336,9 +339,10 @@ def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> li
         predictions.status.tolist(),
         strict=True,
     )
+    rows = [(dict(zip(rules.inputs, row, strict=True)), *end) for row, *end in result]
     return [
-        _reason(rules, shapes, dict(zip(rules.inputs, row, strict=True)), rule, status)
-        for row, rule, status in result
+        _reason(rules, shapes, row, rule, status) + _replaced_text(rules.variables, row)
+        for row, rule, status in rows
     ]
 
 
@@ -368,6 +372,19 @@ def _reason(
     equal = [k for k, s in enumerate(strengths, 1) if s == strengths[number - 1]]
     others = ", ".join(str(k) for k in equal if k != number)
     return f"{text}{rule.then}; as strong: rule {others}"
+
+
+def _replaced_text(variables: Sequence[Variable], row: Mapping[str, float]) -> str:
+    """Return which values of a row were missing, and what stands for each."""
+    texts: list[str] = []
+    for variable in variables:
+        value = variable.missing
+        if value is None or math.isfinite(row[variable.name]):
+            continue
+        names = (*variable.categories, "no category")  # the code of which is -1
+        word = names[int(value)] if variable.categories else f"{value:g}"
+        texts.append(f"{variable.name} by {word}")
+    return f"; missing and replaced: {', '.join(texts)}" if texts else ""
 
 
 def _short(degree: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from xml.etree import ElementTree
 
 import pytest
@@ -45,7 +46,7 @@ def test_names_stand_in_the_order_of_their_lines_and_apart(
     by_name = sorted(lines, key=lambda line: line[1])
     assert [end for _, _, end in by_name] == sorted(end for _, _, end in lines)
     places = [name for _, name, _ in by_name]
-    gaps = [b - a for a, b in zip(places, places[1:], strict=False)]
+    gaps = [b - a for a, b in itertools.pairwise(places)]
     assert min(gaps) > 12.8
     middle = sum(name - end for _, name, end in lines)
     assert middle == pytest.approx(0, abs=0.5)  # moved up as far as down

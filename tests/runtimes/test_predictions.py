@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.errors import MissingExtraError
@@ -107,6 +108,23 @@ def test_reasons_show_ties_gaps_and_missing_values() -> None:
         "IF force is low (0.5) THEN soft; as strong: rule 2",
         "no rule fires",
         "no finite value: force",
+    ]
+
+
+def test_a_reason_names_the_values_that_stand_for_missing_ones() -> None:
+    age = Variable("age", (LOW,), missing=1.5)
+    colours = [Variable(name, categories=("blue", "red")) for name in ("eye", "hair")]
+    eye, hair = (replace(v, missing=float(k)) for k, v in enumerate(colours, -1))
+    rule = Rule((Proposition("age", ("low",)),), "soft")
+    rules = RuleBase("grip", ("soft",), (age, eye, hair), (rule,))
+    values = np.array([[1.0, math.nan, math.inf], [1.0, math.nan, 0.0], [0.0] * 3])
+    answers = ft.run(rules, values.T, columns=["age", "eye", "hair"])
+    text = "IF age is low (1) THEN soft"
+    assert reasons(rules, values, answers) == [
+        text,
+        "IF age is low (0.75) THEN soft; missing and replaced: age by 1.5, "
+        "eye by no category",
+        "IF age is low (0.75) THEN soft; missing and replaced: age by 1.5",
     ]
 
 
