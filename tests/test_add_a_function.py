@@ -12,6 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parent.parent
 CLASS = '''class Cauchy(MembershipFunction, frozen=True, tag="cauchy"):
     """`1 / (1 + ((x - center) / width)^2)`."""
@@ -164,6 +166,7 @@ def _tried(tmp_path: Path, copy: Path, change: str) -> tuple[str, str]:
     return done.stdout, done.stderr
 
 
+@pytest.mark.heavy
 def test_a_membership_function_is_added_in_two_files(tmp_path: Path) -> None:
     assert len(FUNCTION) == 2
     copy = _edited(tmp_path, FUNCTION)
@@ -185,6 +188,7 @@ fml points product
     assert "toy.yaml: a curve (cauchy) is not known\n" in errors
 
 
+@pytest.mark.heavy
 def test_a_t_norm_is_added_in_two_files(tmp_path: Path) -> None:
     assert len(NORM) == 2
     copy = _edited(tmp_path, NORM)

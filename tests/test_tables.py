@@ -285,11 +285,11 @@ def test_bytes_at_random_give_a_table_or_one_sentence() -> None:
     alphabet = [b"a", b"1", b".", b",", b";", b'"', b"\n", b"\r", b"\0", b"\xe9", b" "]
     found = [
         _outcome(start + b"".join(chance.choices(alphabet, k=chance.randint(0, 20))))
-        for _ in range(1000)
+        for _ in range(300)
         for start in (b"", b"a,grip\n1,x\n")
     ]
     assert {text.split(":")[0].split(" ")[0] for text in found} == {"t.csv", "rows"}
-    assert found.count("rows") > 50
+    assert found.count("rows") > 15
 
 
 def _outcome(content: bytes) -> str:

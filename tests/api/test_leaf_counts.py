@@ -123,6 +123,7 @@ def test_a_part_with_a_fault_leaves_the_counts_as_they_were(
     assert counts.rows == ROWS
 
 
+@pytest.mark.heavy
 def test_counts_of_another_model_target_or_part_are_refused(
     table: pd.DataFrame, tree: FuzzyTree, tmp_path: Path
 ) -> None:

@@ -207,6 +207,7 @@ def test_without_the_extra_a_peer_says_what_is_missing(
     )
 
 
+@pytest.mark.heavy
 def test_a_part_of_the_mat_is_recognised_better_than_by_its_commonest_class() -> None:
     task = known_task("postures")
     few = np.flatnonzero(task.subject <= 4)

@@ -134,6 +134,7 @@ def test_what_takes_too_long_or_breaks_is_said() -> None:
     assert (broken["failed"], broken["accuracy"]) == ("ValueError: no", [])
 
 
+@pytest.mark.heavy
 def test_a_run_goes_on_and_the_page_has_what_was_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

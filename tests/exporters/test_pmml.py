@@ -254,6 +254,7 @@ def test_rules_written_as_points_are_as_near_as_they_say() -> None:
             assert found is None or abs(found - strength) <= max(bounds) + 1e-12
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_points_are_pmmls_own_lists_on_request(seed: int) -> None:
     rules = with_points(rules_from_tree(random_tree(seed)), seed, share=1.0)

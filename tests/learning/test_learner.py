@@ -300,6 +300,7 @@ def test_leaves_are_as_sure_as_rows_that_were_held_out_allow() -> None:
     assert 0.6 < sure[1] < 0.8
 
 
+@pytest.mark.heavy
 def test_many_classes_are_divided_as_clouds() -> None:
     rng = np.random.default_rng(3)
     centres = 4.6 * rng.normal(size=(120, 6))

@@ -169,6 +169,7 @@ def test_a_learner_without_rows_changes_no_byte_of_a_state() -> None:
     assert merged.to_bytes() == learner.to_bytes()
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 def test_any_number_of_threads_gives_the_same_tree(suffix: str, tmp_path: Path) -> None:
     table = pd.concat([rows_of(seed) for seed in range(30)])

@@ -64,6 +64,7 @@ def both(path: str, monkeypatch: pytest.MonkeyPatch) -> tuple[Table, Learner]:
     return whole, result
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["t.csv", "t.parquet"])
 def test_a_table_read_piece_by_piece_gives_the_same_tree(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -51,6 +51,7 @@ def test_a_shift_of_more_than_a_tenth_of_full_is_pressure() -> None:
     assert Rest(SENSOR)(20 + 40 + FREE, 0.0).tolist() == (FREE + 40).tolist()
 
 
+@pytest.mark.heavy
 def test_slow_drift_of_single_cells_is_followed() -> None:
     rest, drift = Rest(SENSOR), np.zeros((SIDE, SIDE))
     drift[::2] = 0.002  # a row in two: no common shift; 36 counts in 6 minutes

@@ -67,6 +67,7 @@ def test_the_core_names_tactile_in_its_tables_alone() -> None:
     assert {name: count for name, count in found.items() if count} == TABLES
 
 
+@pytest.mark.heavy
 def test_every_module_of_the_core_can_be_imported_without_tactile(core: Path) -> None:
     done = _python(core, "-c", IMPORT_ALL)
     assert done.returncode == 0, done.stderr

@@ -31,6 +31,7 @@ def test_no_pair_that_ties_is_left_out(kind: Kind) -> None:
     assert apart > 5
 
 
+@pytest.mark.heavy
 def test_rules_with_curves_of_their_own_are_apart() -> None:
     base = random_base(1, 12, 3, kind="lr")
     found = may_tie(arrange(base, unit_domain(base)))

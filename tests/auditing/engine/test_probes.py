@@ -57,6 +57,7 @@ def test_a_rule_that_never_wins_is_not_seen_to() -> None:
     assert glimpses.wins(number, rivals) is None
 
 
+@pytest.mark.heavy
 def test_a_rule_that_is_not_seen_may_win_in_a_sliver() -> None:
     base = with_hidden_rule(random_base(0, 7, 4), 0.7 - 1e-6)
     number = len(base.rules)
