@@ -74,7 +74,7 @@ def row(name: str) -> str:
         start = time.process_time()
         audit = ft.audit(
             model,
-            selection=ft.AuditSelection(ignore=LEFT_OUT),
+            selection=ft.AuditSelection(skip=LEFT_OUT),
             settings=ft.AuditSettings(budget_s=BUDGET_S),
         )
         seconds += time.process_time() - start

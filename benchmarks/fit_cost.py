@@ -49,7 +49,9 @@ def ratios(values: FloatArray, labels: IntArray) -> list[str]:
     ways: dict[str, Callable[[], object]] = {
         "GaussianNB": lambda: GaussianNB().fit(values, labels),
         "default": lambda: learn(values, labels, LearningSettings()),
-        "single columns": lambda: learn(values, labels, LearningSettings(columns=1)),
+        "single columns": lambda: learn(
+            values, labels, LearningSettings(columns_per_node=1)
+        ),
         "paper": lambda: learn(values, labels, LearningSettings(mode="paper")),
         "partial_fit, 100 chunks": lambda: learn_in_chunks(values, labels, 100),
     }

@@ -161,7 +161,7 @@ def wine() -> FuzzyTree:
         WINE,
         target="cultivar",
         name="wine",
-        settings=ft.LearningSettings(columns=1, leaves=4),
+        settings=ft.LearningSettings(columns_per_node=1, leaves=4),
     )
 
 

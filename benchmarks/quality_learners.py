@@ -331,14 +331,16 @@ def _ours(*, is_small: bool = False, **settings: Any) -> Learner:
 
 LEARNERS: dict[str, Learner] = {
     "fuzzytree": _ours(),
-    "fuzzytree, one column": _ours(columns=1),
+    "fuzzytree, one column": _ours(columns_per_node=1),
     "fuzzytree, paper": Learner(
         _peer("fuzzytree.estimator.FuzzyTreeClassifier", mode="paper"),
         _in_pipeline(_fuzzytree_size),
         package="fuzzytree-toolkit",
     ),
     "fuzzytree, 10 leaves": _ours(leaves=MOST, is_small=True),
-    "fuzzytree, one column, 10 leaves": _ours(columns=1, leaves=MOST, is_small=True),
+    "fuzzytree, one column, 10 leaves": _ours(
+        columns_per_node=1, leaves=MOST, is_small=True
+    ),
     "DecisionTree": Learner(_tree(), _tree_size),
     "DecisionTree of as many leaves": Learner(_tree(), _tree_size, like="fuzzytree"),
     "DecisionTree of as many leaves as one column": Learner(

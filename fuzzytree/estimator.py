@@ -145,8 +145,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     Args:
         mode: `default`, or `paper` for the paper's algorithm to the letter.
-        columns: How many columns a node looks at, at most; 1 gives rules in the table's
-            own words, None as many as help.
+        columns_per_node: How many columns a node looks at, at most; 1 gives rules in
+            the table's own words, None as many as help.
         leaves: How many leaves the tree has, at most.
         min_rows: How many rows a leaf holds, at least.
         depth: How many conditions lead to a leaf, at most.
@@ -199,7 +199,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         self,
         *,
         mode: Mode = "default",
-        columns: int | None = None,
+        columns_per_node: int | None = None,
         leaves: int | None = None,
         min_rows: int | None = None,
         depth: int | None = None,
@@ -215,7 +215,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         seed: int = 0,
     ) -> None:
         self.mode = mode
-        self.columns = columns
+        self.columns_per_node = columns_per_node
         self.leaves = leaves
         self.min_rows = min_rows
         self.depth = depth
@@ -532,7 +532,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _settings(self) -> LearningSettings:
         return LearningSettings(
             mode=self.mode,
-            columns=self.columns,
+            columns_per_node=self.columns_per_node,
             leaves=self.leaves,
             min_rows=self.min_rows,
             depth=self.depth,

@@ -357,7 +357,8 @@ def test_weights_are_routed_through_pipelines_and_searches() -> None:
         pipeline = make_pipeline(scaler, model).fit(
             IRIS, SPECIES, sample_weight=weights
         )
-        search = GridSearchCV(model, {"columns": [1, 2]}, cv=3, scoring=scorer).fit(
+        grid = {"columns_per_node": [1, 2]}
+        search = GridSearchCV(model, grid, cv=3, scoring=scorer).fit(
             IRIS, SPECIES, sample_weight=weights
         )
         tested = cross_validate(
@@ -414,7 +415,7 @@ def test_importances_are_those_of_the_columns_that_decide() -> None:
     rng = np.random.default_rng(0)
     values = rng.normal(size=(400, 4))
     labels = np.where(values[:, 2] > 0, "up", np.where(values[:, 0] > 1, "up", "down"))
-    model = FuzzyTreeClassifier(columns=1).fit(values, labels)
+    model = FuzzyTreeClassifier(columns_per_node=1).fit(values, labels)
     found = model.feature_importances_
     assert found.shape == (4,)
     assert abs(found.sum() - 1.0) < 1e-12

@@ -447,7 +447,7 @@ def bench(
     model: ModelSource,
     *,
     data: object = None,
-    only: Sequence[str] = (),
+    select: Sequence[str] = (),
     skip: Sequence[str] = (),
     settings: benchmarking.BenchSettings | None = None,
     progress: Progress | None = None,
@@ -458,7 +458,7 @@ def bench(
         model: A tree or a rule base, or the path of one.
         data: A table with rows to time and to judge on, repeated where there are too
             few; rows are made of the model's declared ranges if None.
-        only: Names of candidates, such as `native`, questions, such as `raw rules`,
+        select: Names of candidates, such as `native`, questions, such as `raw rules`,
             or kinds, such as `variant`: the others are left out.
         skip: The same, for what is left out.
         settings: Rows in a call, threads, the largest error allowed, and about how many
@@ -478,7 +478,7 @@ def bench(
         >>> from fuzzytree import BenchSettings
         >>> from fuzzytree.testing import random_tree
         >>> few = BenchSettings(rows=(9,), budget_s=9)
-        >>> study = bench(random_tree(1), only=["native"], settings=few)
+        >>> study = bench(random_tree(1), select=["native"], settings=few)
         >>> [point.question for point in study.points]
         ['tree', 'relative rules', 'raw rules']
     """
@@ -487,7 +487,7 @@ def bench(
         first,
         values=rows_of(data, first),
         data=_data_name(data),
-        only=only,
+        select=select,
         skip=skip,
         plan=settings,
         progress=progress,
@@ -787,7 +787,7 @@ def needs(
     data: object = None,
     uses: Sequence[Use] = ("tree", "relative"),
     drop: Collection[Literal["inputs", "rules"]] = (),
-    seconds: float = 0.0,
+    budget_s: float = 0.0,
     progress: Progress | None = None,
 ) -> benchmarking.Footprint:
     """Return what a model needs, and what leaving out the rest saves.
@@ -797,7 +797,7 @@ def needs(
         data: A table with rows of one's own, for the proof.
         uses: What a tree serves: its path, its `relative` rules, its `raw` rules.
         drop: Leave out `inputs` that nothing uses, or `rules` that never fire, too.
-        seconds: How long to measure run times; 0 measures none.
+        budget_s: How long to measure run times; 0 measures none.
         progress: Called with what is done and which share of it.
 
     Raises:
@@ -818,7 +818,7 @@ def needs(
         uses=uses,
         data=rows_of(data, first),
         table=data if path_of(data) else None,
-        seconds=seconds,
+        budget_s=budget_s,
         progress=progress,
     )
 
@@ -928,7 +928,7 @@ def stability(
     model: ModelSource,
     *,
     data: object = None,
-    only: Sequence[str] = (),
+    select: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> checking.Stability:
@@ -937,7 +937,7 @@ def stability(
     Args:
         model: A tree or a rule base, or the path of one.
         data: A table with rows of one's own, beside the probes.
-        only: The codes of criteria, such as `N3`; all unless given.
+        select: The codes of criteria, such as `N3`; all unless given.
         runtimes: The names of the runtimes; all that are installed unless given.
         progress: Called with what is done and which share of it.
 
@@ -948,7 +948,7 @@ def stability(
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> stability(random_tree(1), runtimes=["native"], only=["N3", "N7"]).ok
+        >>> stability(random_tree(1), runtimes=["native"], select=["N3", "N7"]).ok
         True
     """
     first = _model_of(model, "stability")
@@ -958,7 +958,7 @@ def stability(
         runtimes=chosen,
         formats=all_formats(),
         data=rows_of(data, first),
-        only=only,
+        select=select,
         progress=progress or (lambda _text, _share: None),
     )
 

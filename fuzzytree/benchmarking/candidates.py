@@ -405,24 +405,24 @@ def load_peers(path: str | None) -> Peers:
 
 
 def chosen(
-    candidates: Sequence[Candidate], only: Sequence[str], skip: Sequence[str]
+    candidates: Sequence[Candidate], select: Sequence[str], skip: Sequence[str]
 ) -> tuple[list[Candidate], list[Omission]]:
     """Return the candidates that are wanted, and a line about the others.
 
-    `only` and `skip` have names, parts before the colon, questions or kinds.
+    `select` and `skip` have names, parts before the colon, questions or kinds.
 
     Raises:
         ValueError: If a word names nothing that could be there, or nothing is left;
             the message lists what there is.
     """
     known = set().union(_GROUPS, *map(_words, candidates))
-    for word in (*only, *skip):
+    for word in (*select, *skip):
         if word not in known:
             raise ValueError(_unknown(word, candidates))
     kept = [
         one
         for one in candidates
-        if (not only or not _words(one).isdisjoint(only))
+        if (not select or not _words(one).isdisjoint(select))
         and _words(one).isdisjoint(skip)
     ]
     if not kept:

@@ -138,7 +138,7 @@ def report(
     uses: Collection[Use] = ("tree", "relative"),
     data: FloatArray | None = None,
     table: object = None,
-    seconds: float = 0.0,
+    budget_s: float = 0.0,
     progress: Progress | None = None,
 ) -> Footprint:
     """Return what a model needs, prove its pruned form, and what that saves.
@@ -149,15 +149,15 @@ def report(
         uses: What a tree serves, as when it was pruned.
         data: Rows of one's own for the proof, in the order of the model's inputs.
         table: The path of a table; reading it is timed.
-        seconds: For all timings together; 0 for none.
+        budget_s: For all timings together; 0 for none.
         progress: Called with the current step and the share that is done.
     """
     models = stages(model, remainder.model)
     taken, omissions = sizes(models, uses)
     timed, untimed = (
         ((), ())
-        if seconds <= 0
-        else costs(models, uses, table=table, seconds=seconds, progress=progress)
+        if budget_s <= 0
+        else costs(models, uses, table=table, seconds=budget_s, progress=progress)
     )
     return Footprint(
         needs(model, uses=uses),

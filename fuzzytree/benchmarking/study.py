@@ -99,7 +99,7 @@ def bench(
     *,
     values: FloatArray | None = None,
     data: str = "",
-    only: Sequence[str] = (),
+    select: Sequence[str] = (),
     skip: Sequence[str] = (),
     plan: BenchSettings | None = None,
     progress: Progress | None = None,
@@ -111,7 +111,7 @@ def bench(
         values: Rows of shape (inputs, rows), in the order of `model.inputs`; repeated
             where a call has more. Rows are made of the declared ranges if None.
         data: What to call them.
-        only: Names of candidates, or the part before the colon, or a question, or a
+        select: Names of candidates, or the part before the colon, or a question, or a
             kind (`runtime`, `variant`, `peer`, `floor`): the others are left out.
         skip: The same, for what is left out.
         plan: How many rows, threads, seconds.
@@ -127,7 +127,7 @@ def bench(
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> few = BenchSettings(rows=(10,), threads=(1,), rounds=6, budget_s=5.0)
-        >>> study = bench(random_tree(1), only=["native"], plan=few)
+        >>> study = bench(random_tree(1), select=["native"], plan=few)
         >>> [point.name for point in study.points]
         ['native: tree', 'native: relative rules', 'native: raw rules']
     """
@@ -141,7 +141,7 @@ def bench(
         count = values.shape[1]
         text = _data_text(f"{data or 'a table'}, {_rows(count)}", count, plan)
     candidates, omitted = gather(model, values, plan.peers)
-    kept, left = chosen(candidates, as_names(only), as_names(skip))
+    kept, left = chosen(candidates, as_names(select), as_names(skip))
     return run_study(
         model,
         kept,

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 _MOST_LIMITS = 3  # undeclared ranges that are reported one by one
 
-Form = Literal["text", "json", "sarif", "github"]
+Form = Literal["text", "sarif", "github"]
 
 
 _EXAMPLES = """\b
@@ -82,16 +82,14 @@ class AuditOptions(FullResultOptions):
     select: tuple[str, ...] = several(
         "--select CODES", "Codes to examine, such as FT1,FT301; all by default."
     )
-    ignore: tuple[str, ...] = several(
-        "--ignore CODES", "Codes to leave out, such as FT5."
-    )
+    skip: tuple[str, ...] = several("--skip CODES", "Codes to leave out, such as FT5.")
     budget: float | None = option(
         "--budget SECONDS",
         "Time limit of the audit in seconds; 60 by default.",
         type=float,
     )
     settings: tuple[str, ...] = several(
-        "--set NAME=VALUE",
+        "--setting NAME=VALUE",
         "Threshold (epsilon, margin, lead, level, overlap), or rows, seed.",
     )
     config: str | None = option(
@@ -111,8 +109,8 @@ class AuditOptions(FullResultOptions):
     )
     form: Form = option(
         "--output-format",
-        "Format of the result: for people, programs or code hosts.",
-        choices=["text", "json", "sarif", "github"],
+        "Format of the result: text for people, or that of a code host.",
+        choices=["text", "sarif", "github"],
         default="text",
     )
     is_whole: bool = flag(
@@ -196,14 +194,14 @@ def command(options: AuditOptions) -> int:
             ),
             selection=AuditSelection(
                 select=codes_of(options.select) or known.select,
-                ignore=codes_of(options.ignore) or known.ignore,
+                skip=codes_of(options.skip) or known.skip,
                 accepted=accepted,
             ),
             settings=settings_of(options.settings, options.budget, known),
             repeat=repeating(click.get_current_context()),
             progress=show,
         )
-    form = "json" if options.as_json else options.form
+    form: Form | Literal["json"] = "json" if options.as_json else options.form
     known_ids = accepted if path else None
     lost = [*resolved_ids(accepted, found)]
     if form == "text":
@@ -247,7 +245,7 @@ def command(options: AuditOptions) -> int:
     return 130 if found.was_interrupted else int(fails)
 
 
-def _for_programs(found: Audit, form: Form, baseline: Mapping[str, str] | None) -> str:
+def _for_programs(found: Audit, form: str, baseline: Mapping[str, str] | None) -> str:
     """Return an audit as JSON, SARIF or annotations of a code host."""
     match form:
         case "sarif":

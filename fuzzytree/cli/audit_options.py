@@ -86,7 +86,8 @@ def settings_of(
     """
     from fuzzytree.auditing import check_settings, settings_with
 
-    found = settings_with(known.audit_settings, dict(map(setting, texts)))
+    values = dict(setting(text, "--setting") for text in texts)
+    found = settings_with(known.audit_settings, values)
     if budget is not None:
         found = msgspec.structs.replace(found, budget_s=budget)
         check_settings(found)

@@ -16,7 +16,6 @@ from fuzzytree.cli.console import (
     answer_json,
     argument,
     delimiter_option,
-    flag,
     option,
     progress_bar,
     say,
@@ -55,8 +54,8 @@ class BenchOptions(FullResultOptions):
         multiple=True,
         default=(1, 2),
     )
-    only: Sequence[str] = several(
-        "--only NAME",
+    select: Sequence[str] = several(
+        "--select NAME",
         "Candidates to measure, such as native, 'raw rules', variant (repeat).",
     )
     skip: Sequence[str] = several("--skip NAME", "Candidates to leave out (repeat).")
@@ -80,9 +79,8 @@ class BenchOptions(FullResultOptions):
     )
     output: str | None = option("-o --output FILE", "JSON file to write the study to.")
     plots: Sequence[str] = several(
-        "--plot FILE", "Picture of the study, as .svg or .png (repeat)."
+        "--picture FILE", "Picture of the study, as .svg or .png (repeat)."
     )
-    is_full: bool = flag("--full", "List variants that are slower and less exact, too.")
     delimiter: str | None = delimiter_option
 
 
@@ -110,7 +108,7 @@ def command(options: BenchOptions) -> int:
         found = api.bench(
             options.model,
             data=table_source(options.data, options.delimiter),
-            only=options.only,
+            select=options.select,
             skip=options.skip,
             settings=BenchSettings(
                 tuple(options.rows),
@@ -122,7 +120,7 @@ def command(options: BenchOptions) -> int:
             ),
             progress=show,
         )
-    lines = study_lines(found, is_verbose=options.verbose, is_full=options.is_full)
+    lines = study_lines(found, is_verbose=options.verbose)
     if not found.points:  # a file of an earlier study is worth more
         output, plots = None, ()
     try:
@@ -172,7 +170,7 @@ def _check_places(output: str | None, plots: Sequence[str]) -> None:
         suffix = Path(place).suffix.lower()
         if suffix not in SUFFIXES:
             known = " or ".join(SUFFIXES)
-            raise click.UsageError(f"--plot {place}: a picture ends in {known}")
+            raise click.UsageError(f"--picture {place}: a picture ends in {known}")
         check_suffix(suffix)
 
 

@@ -32,11 +32,10 @@ class CheckOptions(FullResultOptions):
     data: str | None = data_option
     runtimes: Sequence[str] = runtimes_option
     limit: int | None = option(
-        "--limit",
-        "Largest number of probes; 20000 by default, 2000 for a fuzzy system.",
+        "--generate N",
+        "Most rows to generate; 20000 by default, 2000 for a fuzzy system.",
         type=click.IntRange(min=1),
     )
-    is_full: bool = flag("--rows", "List rows that differ by an allowed amount, too.")
     delimiter: str | None = delimiter_option
     rows_only: bool = rows_only_option
     run_code: bool = flag(
@@ -73,9 +72,7 @@ def command(options: CheckOptions) -> int:
             allow_loss=options.allow_loss,
             progress=show,
         )
-    lines = report.agreement_lines(
-        found, is_verbose=options.verbose, is_full=options.is_full
-    )
+    lines = report.agreement_lines(found, is_verbose=options.verbose)
     is_silent = options.quiet and found.ok
     answer_result(found.to_json, lines, as_json=options.as_json, is_silent=is_silent)
     return 0 if found.ok else 1

@@ -17,8 +17,10 @@ from fuzzytree.cli.console import (
     categorical_option,
     delimiter_option,
     ignore_option,
+    missing_option,
     option,
     progress_bar,
+    rows_per_class_option,
     say_rows,
     table_source,
     takes,
@@ -46,21 +48,13 @@ class CollectOptions(ResultOptions):
         "--for MODEL", "Count the rows in each leaf of a tree: the second pass."
     )
     columns: str | None = option(
-        "--columns NAMES",
+        "--inputs NAMES",
         "Columns to learn from, separated by commas; all of the first PART by default.",
     )
     ignore: Sequence[str] = ignore_option
     categorical: Sequence[str] = categorical_option
-    rows_per_class: int | None = option(
-        "--rows-per-class",
-        "Largest number of rows per class that the learner keeps.",
-        type=click.IntRange(min=1),
-    )
-    missing: str | None = option(
-        "--missing",
-        "Rows with missing values: take them, or refuse the part.",
-        choices=["learn", "drop", "refuse"],
-    )
+    rows_per_class: int | None = rows_per_class_option
+    missing: str | None = missing_option
     delimiter: str | None = delimiter_option
 
 

@@ -75,7 +75,8 @@ def takes(
 ) -> Callable[[Callable[[Record], Code]], Callable[..., Code]]:
     """Give a command the options that a class has as attributes, as one object.
 
-    Attributes of a base class come last.
+    Attributes of a base class come last. `Sections` prints the options of a class
+    below its attribute `heading`.
 
     Example:
         >>> class Words:
@@ -96,13 +97,37 @@ def takes(
             vars(options).update(values)
             return function(options)
 
-        parameters = [one for base in record.__mro__ for one in vars(base).items()]
-        for name, parameter in reversed(parameters):
-            if isinstance(parameter, functools.partial):
-                parameter(name)(command)
+        parameters = [
+            (name, parameter, getattr(base, "heading", "Options"))
+            for base in record.__mro__
+            for name, parameter in vars(base).items()
+            if isinstance(parameter, functools.partial)
+        ]
+        for name, parameter, _ in reversed(parameters):
+            parameter(name)(command)
+        vars(command)["headings"] = {name: title for name, _, title in parameters}
         return command
 
     return decorate
+
+
+class Sections(click.Command):
+    """A command whose help has its options in sections."""
+
+    def format_options(
+        self, ctx: click.Context, formatter: click.HelpFormatter
+    ) -> None:
+        """Write the options, below the headings of the classes they come from."""
+        headings = vars(self.callback)["headings"]
+        sections: dict[str, list[tuple[str, str]]] = {}
+        for parameter in self.get_params(ctx):
+            line = parameter.get_help_record(ctx)
+            if line is not None and isinstance(parameter, click.Option):
+                title = headings.get(parameter.name, ResultOptions.heading)
+                sections.setdefault(title, []).append(line)
+        for title, lines in sections.items():
+            with formatter.section(title):
+                formatter.write_dl(lines)
 
 
 verbose_option = flag("--verbose", "Print every part of the result, not only counts.")
@@ -113,6 +138,7 @@ quiet_option = flag("--quiet", "Print errors only.")
 class ResultOptions:
     """The options of a verb that has a result; they stand last in its help."""
 
+    heading: str = "Output"
     as_json: bool = json_option
     quiet: bool = quiet_option
 
@@ -133,6 +159,18 @@ ignore_option = several("--ignore COLUMN", "Column that is no input (repeat).")
 categorical_option = several(
     "--categorical COLUMN",
     "Column whose cells are all categories, numbers too (repeat).",
+)
+
+rows_per_class_option = option(
+    "--rows-per-class",
+    "Largest number of rows per class that the learner keeps.",
+    type=click.IntRange(min=1),
+)
+
+missing_option = option(
+    "--missing",
+    "Missing values: learn what stands for them, drop the rows, or refuse the table.",
+    choices=["learn", "drop", "refuse"],
 )
 
 allow_loss_option = flag(
@@ -249,8 +287,8 @@ def standard_input() -> BinaryIO:
     return sys.stdin.buffer
 
 
-def setting(text: str) -> tuple[str, str]:
-    """Return the name and the value of a `--set`.
+def setting(text: str, option: str = "--set") -> tuple[str, str]:
+    """Return the name and the value of a `--set`, or of an option like it.
 
     Raises:
         click.UsageError: If it is none.
@@ -261,7 +299,7 @@ def setting(text: str) -> tuple[str, str]:
     """
     name, mark, value = text.partition("=")
     if not mark or not name.strip():
-        raise click.UsageError(f"--set {text}: must be NAME=VALUE")
+        raise click.UsageError(f"{option} {text}: must be NAME=VALUE")
     return name.strip().replace("-", "_"), value.strip()
 
 

@@ -14,6 +14,7 @@ import msgspec
 
 from fuzzytree.cli.collect import STATE
 from fuzzytree.cli.console import (
+    Sections,
     answer_bytes,
     answer_json,
     argument,
@@ -21,8 +22,10 @@ from fuzzytree.cli.console import (
     delimiter_option,
     flag,
     ignore_option,
+    missing_option,
     option,
     progress_bar,
+    rows_per_class_option,
     say_rows,
     several,
     table_source,
@@ -59,19 +62,13 @@ FEW_GROUPS = 10
 """Groups of a class below which its accuracy says little."""
 
 
-class LearnOptions(RepresentationOptions):
-    """The arguments and options of the verb."""
+class TableOptions:
+    """The options of the table."""
 
-    tables: Sequence[str] = argument("TABLE", nargs=-1, required=True)
+    heading: str = "Table"
     target: str | None = option(
         "--target COLUMN",
         "Column that holds the class of each row; states know theirs.",
-    )
-    output: str = option(
-        "-o --output FILE", "File to write; `-` is stdout.", required=True
-    )
-    name: str | None = option(
-        "--name TEXT", "Name of the tree; the name of TABLE by default."
     )
     weight: str | None = option(
         "--weight COLUMN",
@@ -86,30 +83,26 @@ class LearnOptions(RepresentationOptions):
     ignore: Sequence[str] = ignore_option
     categorical: Sequence[str] = categorical_option
     units: Sequence[str] = several("--unit COLUMN=UNIT", "Unit of a column (repeat).")
-    no_test: bool = flag(
-        "--no-test", "Learn without measuring the cross-validated accuracy."
+    costs: Sequence[str] = several(
+        "--cost COLUMN=COST", "Cost of computing a column (repeat)."
     )
-    front: str | None = option(
-        "--front FILE.svg",
-        "Draw the accuracy of small trees, by columns a node and by leaves.",
-    )
-    model: str | None = option(
-        "--for MODEL",
-        "Write this tree with the supports that states of `collect --for` count.",
-    )
-    repeated: bool = flag(
-        "--repeated", "Count the rows of a state twice that is part of two others."
-    )
+    missing: str | None = missing_option
     delimiter: str | None = delimiter_option
+
+
+class TreeOptions:
+    """The options of the tree."""
+
+    heading: str = "Tree"
     mode: Any = option(
         "--mode",
         "Learner: the default one, or that of the paper exactly.",
         choices=["default", "paper"],
         default="default",
     )
-    columns: Any = option(
-        "--columns",
-        "Largest number of columns that a node looks at; 1 for rules in their words.",
+    columns_per_node: Any = option(
+        "--columns-per-node",
+        "Largest number of columns in one node; 1 gives rules in the table's words.",
         type=int,
     )
     leaves: Any = option("--leaves", "Largest number of leaves.", type=int)
@@ -121,60 +114,84 @@ class LearnOptions(RepresentationOptions):
     shrinkage: Any = option(
         "--shrinkage", "Shrinkage of the off-diagonal scatter, 0 to 1.", type=float
     )
-    alpha: Any = option(
-        "--alpha",
-        "Of the paper: weight of the means in the distance of patterns, 0 to 1.",
-        type=float,
+    class_weight: Any = option(
+        "--class-weight",
+        "`balanced`: let all classes weigh the same, however many rows they have.",
+        choices=["balanced"],
     )
-    l_max: Any = option(
-        "--l-max",
-        "Of the paper: its parameter L_MAX, largest ratio of distances.",
-        type=float,
-    )
-    patterns_per_class: Any = option(
-        "--patterns", "Of the paper: number of patterns of each class.", type=int
-    )
-    keep_reversals: Any = flag(
-        "--keep-reversals",
-        "Of the paper: let a wide set take back the far tails of others.",
-    )
+    rows_per_class: int | None = rows_per_class_option
     points: Any = option(
         "--points", "Number n of the 2n + 1 points on a fitted set, 1 to 8.", type=int
     )
     separate_sides: Any = flag(
         "--separate-sides", "Fit the two sides of a set separately."
     )
-    costs: Sequence[str] = several(
-        "--cost COLUMN=COST", "Cost of computing a column (repeat)."
-    )
-    class_weight: Any = option(
-        "--class-weight",
-        "`balanced`: let all classes weigh the same, however many rows they have.",
-        choices=["balanced"],
-    )
-    rows_per_class: Any = option(
-        "--rows-per-class",
-        "Largest number of rows per class that the learner keeps.",
-        type=int,
-    )
     seed: int = option(
         "--seed", "Random seed for the cross-validation folds.", default=0
     )
-    missing: Any = option(
-        "--missing",
-        "Missing values: learn what stands for them, drop the rows, or refuse the "
-        "table.",
-        choices=["learn", "drop", "refuse"],
+
+
+class PaperOptions:
+    """The options that only the paper's learner has."""
+
+    heading: str = "Tree of --mode paper"
+    alpha: Any = option(
+        "--alpha",
+        "Weight of the means in the distance of patterns, 0 to 1.",
+        type=float,
+    )
+    l_max: Any = option(
+        "--l-max",
+        "The paper's L_MAX, the largest ratio of distances.",
+        type=float,
+    )
+    patterns_per_class: Any = option(
+        "--patterns", "Number of patterns of each class.", type=int
+    )
+    keep_reversals: Any = flag(
+        "--keep-reversals",
+        "Let a wide set take back the far tails of others.",
     )
 
 
-@click.command("learn", short_help="Learn a tree from a table.")
+class OutputOptions(RepresentationOptions):
+    """The options of what is written and printed."""
+
+    output: str = option(
+        "-o --output FILE", "File to write; `-` is stdout.", required=True
+    )
+    name: str | None = option(
+        "--name TEXT", "Name of the tree; the name of TABLE by default."
+    )
+    no_test: bool = flag(
+        "--no-test", "Learn without measuring the cross-validated accuracy."
+    )
+    front: str | None = option(
+        "--front FILE.svg",
+        "Picture to draw: the accuracy of small trees, by columns per node and leaves.",
+    )
+    model: str | None = option(
+        "--for MODEL",
+        "Write this tree with the supports that states of `collect --for` count.",
+    )
+    repeated: bool = flag(
+        "--repeated", "Count the rows of a state twice that is part of two others."
+    )
+
+
+class LearnOptions(TableOptions, TreeOptions, PaperOptions, OutputOptions):
+    """The arguments and options of the verb."""
+
+    tables: Sequence[str] = argument("TABLE", nargs=-1, required=True)
+
+
+@click.command("learn", cls=Sections, short_help="Learn a tree from a table.")
 @takes(LearnOptions)
 def command(options: LearnOptions) -> None:
     """Learn a fuzzy tree from TABLE and write it to FILE.
 
-    Beside a program or a graph, which no verb reads as a model, the model itself is
-    written as YAML, unless a file of that name is there already.
+    Learning straight to C, SQL or ONNX also saves the model as YAML, unless that file
+    exists.
 
     TABLE is CSV, Parquet or Arrow: a file, a folder, a pattern such as 'rows/*.csv', a
     place such as s3://place/rows.parquet, or `-` for standard input; or there are
@@ -182,8 +199,8 @@ def command(options: LearnOptions) -> None:
     of any length are read in bounded memory. The accuracy is
     cross-validated: it is that of trees learnt without the rows that they are tested
     on, and each fold chooses anew how to split and to prune; the folds are made of
-    20,000 rows at most. Of states, and of a table with more than 2^25 numbers, it is an
-    estimate from the rows that are kept, as the supports of leaves are.
+    20,000 rows at most. For states, and for tables above 33 million cells, accuracy
+    and supports of leaves are estimated from the rows that are kept.
     """
     form = wanted_format(options.output, None)
     if options.output != "-":

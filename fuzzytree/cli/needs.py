@@ -38,7 +38,7 @@ class NeedsOptions(FullResultOptions):
         "File to write the simplified model to, if its equality is proved.",
     )
     uses: Sequence[Use] = option(
-        "--for",
+        "--use",
         "Use of a tree (repeat); its path and its relative rules by default.",
         choices=["tree", "relative", "raw"],
         multiple=True,
@@ -49,8 +49,8 @@ class NeedsOptions(FullResultOptions):
         choices=["inputs", "rules"],
         multiple=True,
     )
-    seconds: float | None = option(
-        "--time SECONDS",
+    budget: float | None = option(
+        "--budget SECONDS",
         "Time in seconds for measuring loading, prediction and reading.",
         type=click.FloatRange(min=0.0, min_open=True),
     )
@@ -96,7 +96,7 @@ def command(options: NeedsOptions) -> int:
             table=None
             if options.data == "-"
             else table_source(options.data, options.delimiter),
-            seconds=options.seconds or 0.0,
+            budget_s=options.budget or 0.0,
             progress=show,
         )
     if options.as_json:

@@ -167,14 +167,28 @@ def _error_text(error: FuzzyTreeError, verb: str) -> str:
     return text.replace("pass allow_loss=True", offer)
 
 
+_SYNONYMS = {
+    **{"--columns": "--inputs", "--full": "--verbose", "--ignore": "--skip"},
+    **{"--label": "--target", "--limit": "--generate", "--max-depth": "--depth"},
+    **{"--max-leaf-nodes": "--leaves", "--min-samples-leaf": "--min-rows"},
+    **{"--only": "--select", "--page": "--serve", "--plot": "--picture"},
+    **{"--random-state": "--seed", "--rows": "--generate", "--time": "--budget"},
+}
+"""What options are called elsewhere, and here."""
+
+
 def _usage_text(error: click.ClickException) -> str:
     message = error.format_message().strip()
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    if context and isinstance(error, click.NoSuchOption):
+        name = _SYNONYMS.get(error.option_name)
+        if any(name in parameter.opts for parameter in context.command.params):
+            message = f"{error.message.removesuffix('.')} (did you mean {name!r}?)"
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         return message
     message = message[:1].lower() + message[1:]
     if not message.endswith("..."):
         message = message.removesuffix(".")
-    context = error.ctx if isinstance(error, click.UsageError) else None
     hint = f"\n  {context.command_path} --help lists the options" if context else ""
     return message + hint
 

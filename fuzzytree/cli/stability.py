@@ -12,7 +12,6 @@ from fuzzytree.cli.console import (
     argument,
     data_option,
     delimiter_option,
-    flag,
     progress_bar,
     runtimes_option,
     several,
@@ -27,11 +26,10 @@ class StabilityOptions(FullResultOptions):
 
     model: str = argument("MODEL")
     data: str | None = data_option
-    only: Sequence[str] = several(
-        "--only CODE", "Check to apply, such as N3 (repeat); all by default."
+    select: Sequence[str] = several(
+        "--select CODE", "Check to apply, such as N3 (repeat); all by default."
     )
     runtimes: Sequence[str] = runtimes_option
-    is_full: bool = flag("--rows", "The same as --verbose.")
     delimiter: str | None = delimiter_option
 
 
@@ -51,12 +49,12 @@ def command(options: StabilityOptions) -> int:
         found = api.stability(
             options.model,
             data=table_source(options.data, options.delimiter),
-            only=options.only,
+            select=options.select,
             runtimes=options.runtimes or None,
             progress=show,
         )
     is_failed = any(one.verdict == "FAILS" for one in found.criteria)
-    lines = stability_lines(found, is_verbose=options.verbose or options.is_full)
+    lines = stability_lines(found, is_verbose=options.verbose)
     is_silent = options.quiet and not is_failed
     answer_result(found.to_json, lines, as_json=options.as_json, is_silent=is_silent)
     return int(is_failed)

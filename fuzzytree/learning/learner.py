@@ -305,7 +305,7 @@ class ArrayLearner:
         )
         rules = SplitRules(
             min_rows=settings.min_rows or min(_MIN_ROWS, int(kept[kept > 0].min())),
-            columns=settings.columns or len(self.columns),
+            columns=settings.columns_per_node or len(self.columns),
             entry=settings.entry,
             shrinkage=settings.shrinkage,
             costs=ready.costs,

@@ -610,7 +610,7 @@ def _difference(what: str, mine: Sequence[str], others: Sequence[str]) -> str:
     if set(mine) == set(others):
         return (
             f"the states have the columns in another order: {', '.join(mine)}, and "
-            f"{', '.join(others)}; name the columns to have one order (--columns)"
+            f"{', '.join(others)}; name the columns to have one order (--inputs)"
         )
     only = sorted({*mine} ^ {*others})
     return f"the states have other columns: only one of them has {', '.join(only)}"

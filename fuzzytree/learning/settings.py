@@ -21,8 +21,8 @@ class LearningSettings(
         mode: `paper` takes the paper to the letter: fuzzy patterns of the classes, one
             feature a node, ties to the first feature. `default` scores each split by
             the classes of the rows, and held-out rows prune the tree.
-        columns: How many columns a node looks at, at most; 1 gives rules in the table's
-            own words. None: as many as help.
+        columns_per_node: How many columns a node looks at, at most; 1 gives rules in
+            the table's own words. None: as many as help.
         leaves: How many leaves the tree has, at most.
         min_rows: How many rows a leaf holds, at least.
         depth: How many conditions lead to a leaf, at most.
@@ -60,7 +60,7 @@ class LearningSettings(
     """
 
     mode: Literal["default", "paper"] = "default"
-    columns: int | None = None
+    columns_per_node: int | None = None
     leaves: int | None = None
     min_rows: int | None = None
     depth: int | None = None
@@ -111,7 +111,13 @@ class LearningSettings(
                 f"missing is 'learn', 'drop' or 'refuse', not {self.missing!r}",
             ),
         ]
-        for name in ("columns", "leaves", "min_rows", "depth", "rows_per_class"):
+        for name in (
+            "columns_per_node",
+            "leaves",
+            "min_rows",
+            "depth",
+            "rows_per_class",
+        ):
             value = getattr(self, name)
             text = f"{name} is at least 1, not {value!r}"
             claims.append((value is None or value >= 1, text))
@@ -145,7 +151,7 @@ class LearningSettings(
 
 
 _OF_MODE = {
-    "default": ("columns", "leaves", "min_rows", "depth", "class_weight"),
+    "default": ("columns_per_node", "leaves", "min_rows", "depth", "class_weight"),
     "paper": ("alpha", "l_max", "patterns_per_class", "keep_reversals"),
 }
 """Settings that one mode alone has."""

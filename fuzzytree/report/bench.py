@@ -40,16 +40,12 @@ _LEGEND = (
 )
 
 
-def study_lines(
-    study: Study, *, is_verbose: bool = False, is_full: bool = False
-) -> Iterator[str]:
+def study_lines(study: Study, *, is_verbose: bool = False) -> Iterator[str]:
     """Yield a study: what to use, the unbeaten candidates, how many were left out.
 
     Args:
         study: The study.
         is_verbose: Whether to print every table, omission and advice.
-        is_full: Whether to list variants too that are beaten in both run time and
-            error; it includes the rest.
     """
     advice = study.advice[-1] if study.advice else _nothing(study)
     yield from wrapped(advice, _WIDTH, rest="  ")
@@ -58,8 +54,8 @@ def study_lines(
     left = [one for one in study.omissions if one.name not in names]
     for line in _grouped(one for one in left if one.is_peer):
         yield from wrapped(f"peers left out: {line}", _WIDTH, rest="  ")
-    if is_verbose or is_full:
-        yield from _tables(study, is_full=is_full)
+    if is_verbose:
+        yield from _tables(study)
         return
     if study.points:
         yield from aligned([_UNBEATEN, *_unbeaten(study)][: _MOST_UNBEATEN + 1])
@@ -98,12 +94,12 @@ def _unbeaten(study: Study) -> Iterator[tuple[str, ...]]:
         )
 
 
-def _tables(study: Study, *, is_full: bool) -> Iterator[str]:
+def _tables(study: Study) -> Iterator[str]:
     yield from aligned(machine_rows(study.machine))
     for rows, threads in sizes(study.points):
         yield ""
         yield f"{rows:,} row{'' if rows == 1 else 's'}, {counted(threads, 'thread')}"
-        table = [*_table(study, rows, threads, is_full=is_full)]
+        table = [*_table(study, rows, threads)]
         width = max(map(len, table))
         yield from aligned([(*row, *[""] * (width - len(row))) for row in table])
     if study.points:
@@ -146,9 +142,7 @@ def timed_of(study: Study, rows: int, threads: int) -> Timed:
     }
 
 
-def _table(
-    study: Study, rows: int, threads: int, *, is_full: bool
-) -> Iterator[tuple[str, ...]]:
+def _table(study: Study, rows: int, threads: int) -> Iterator[tuple[str, ...]]:
     """Yield the cells of one table, question by question, the fastest first."""
     yield ("", *_HEAD)
     timed = timed_of(study, rows, threads)
@@ -160,20 +154,16 @@ def _table(
             questions[point.question] = None
     for question in questions:
         best = unbeaten(study, question, rows, threads)
-        yield from _rows(question, timed, best, is_full=is_full)
+        yield from _rows(question, timed, best)
 
 
 def _rows(
-    question: Question, timed: Timed, best: Sequence[str], *, is_full: bool
+    question: Question, timed: Timed, best: Sequence[str]
 ) -> Iterator[tuple[str, ...]]:
-    """Yield the cells of one question; beaten variants are counted or listed."""
+    """Yield the cells of one question, the fastest first."""
     yield (question,)
-    beaten = 0
     for point, timing in sorted(timed.values(), key=lambda one: one[1].median_ns):
         if point.question != question or point.kind == "floor":
-            continue
-        if point.kind == "variant" and point.name not in best and not is_full:
-            beaten += 1
             continue
         mark = "*" if point.name in best else " "
         short = point.name.removesuffix(f": {question}")
@@ -182,8 +172,6 @@ def _rows(
             *_time_cells(timing, timed, question),
             *_errors(point),
         )
-    if beaten:
-        yield (f"  and {counted(beaten, 'variant')} that something beats",)
 
 
 def unbeaten(

@@ -110,21 +110,19 @@ def digits(value: float) -> str:
 # --- checks
 
 
-def agreement_lines(
-    agreement: Agreement, *, is_verbose: bool = False, is_full: bool = False
-) -> Iterator[str]:
+def agreement_lines(agreement: Agreement, *, is_verbose: bool = False) -> Iterator[str]:
     """Yield a check: its verdict, counts of what agrees, and all that does not.
 
     Args:
         agreement: The check.
-        is_verbose: Whether each comparison has a line, and not only a count.
-        is_full: Whether to print the rows that differ by an allowed amount, too.
+        is_verbose: Whether each comparison has a line, and not only a count, and the
+            rows that differ by an allowed amount are printed, too.
     """
     verdict, basis = agreement_verdict(agreement), _basis_text(agreement)
     yield f"{agreement.model}: {verdict} ({basis})"
     comparisons = agreement.comparisons
     wrong = [c for c in comparisons if c.verdict in ("DISAGREES", "rows only")]
-    if is_verbose or is_full:
+    if is_verbose:
         shown: Sequence[Comparison] = agreement.comparisons
         yield from aligned([COMPARISON, *map(comparison_row, shown)])
     else:
@@ -134,7 +132,7 @@ def agreement_lines(
             yield from aligned([COMPARISON, *map(comparison_row, shown)])
         yield from more_line(len(wrong) - len(shown), "comparison")
     for comparison in shown:
-        if comparison.detail and (is_full or comparison in wrong):
+        if comparison.detail and (is_verbose or comparison in wrong):
             yield f"{comparison.representation} compared with {comparison.against}:"
             yield from (f"  {line}" for line in comparison.detail)
     for count in agreement.counts:

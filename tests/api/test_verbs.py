@@ -80,7 +80,7 @@ VERBS: dict[str, Callable[[Any], object]] = {
     "bench": lambda model: (
         ft.bench(
             model,
-            only=["native"],
+            select=["native"],
             settings=ft.BenchSettings(rows=(9,), budget_s=1),
         ).fingerprint
     ),
@@ -106,7 +106,9 @@ VERBS: dict[str, Callable[[Any], object]] = {
     "rules_from_tree": ft.rules_from_tree,
     "run": lambda model: ft.run(model, FEW).classes,
     "save": lambda model: ft.save(model, os.devnull, to="yaml").content,
-    "stability": lambda model: ft.stability(model, runtimes=["native"], only=["N3"]).ok,
+    "stability": lambda model: (
+        ft.stability(model, runtimes=["native"], select=["N3"]).ok
+    ),
 }
 
 
@@ -381,5 +383,5 @@ def test_a_number_type_that_does_not_exist_is_refused() -> None:
 def test_a_text_is_one_name_in_every_argument_that_takes_names() -> None:
     tree = random_tree(1)
     assert ft.check(tree, runtimes="native", settings=ft.CheckSettings(limit=100)).ok
-    assert ft.stability(tree, runtimes="native", only="N3").ok
+    assert ft.stability(tree, runtimes="native", select="N3").ok
     assert ft.audit(tree, selection=ft.AuditSelection(select="FT501")).is_complete

@@ -504,7 +504,7 @@ def test_values_that_do_not_fit_are_refused() -> None:
 def test_a_study_of_a_real_model_agrees_with_itself() -> None:
     only = ["native", "native float32", "best-first", "python", "floor"]
     plan = BenchSettings(rows=(1, 300), threads=(1,), rounds=6, budget_s=PATIENCE_S)
-    study = bench(random_tree(5), only=only, plan=plan)
+    study = bench(random_tree(5), select=only, plan=plan)
     assert study.is_complete
     assert [*faults(study.points)] == []
     assert study.data.startswith("300 rows made from the model's declared ranges")
@@ -524,7 +524,7 @@ def test_rows_of_a_table_are_named_and_counted() -> None:
     tree = random_tree(1)
     values = made_rows(tree, 7)[0]
     plan = BenchSettings(rows=(5, 20), threads=(1,), rounds=6, budget_s=PATIENCE_S)
-    study = bench(tree, values=values, data="t.csv", only=["native: tree"], plan=plan)
+    study = bench(tree, values=values, data="t.csv", select=["native: tree"], plan=plan)
     assert study.data == "t.csv, 7 rows, repeated to make 20"
     assert study.points[0].error is not None
     assert study.points[0].error.rows == 7

@@ -76,8 +76,8 @@ def test_a_page_without_results_has_no_place_for_them(call: Call) -> None:
 def test_what_the_verbs_print_fits_its_schema_and_is_read(call: Call) -> None:
     native = ("--runtime", "native", "--json", "--quiet")
     for name, words in (
-        ("check", ("--limit", "50", *native)),
-        ("stability", ("--only", "N3", *native)),
+        ("check", ("--generate", "50", *native)),
+        ("stability", ("--select", "N3", *native)),
     ):
         _, out, _ = call(name, "grip.yaml", *words)
         schema = json.loads((ROOT / f"schemas/{name}.schema.json").read_text("utf-8"))

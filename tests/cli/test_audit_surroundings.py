@@ -53,7 +53,8 @@ def hostile(name: str) -> RuleBase:
 def test_no_name_breaks_out_of_any_output(call: Call, name: str) -> None:
     ft.save(hostile(name), "odd.yaml")
     for form in ("text", "github", "sarif", "json"):
-        words = ["--output-format", form, "--output", "out"]
+        words = ["--json"] if form == "json" else ["--output-format", form]
+        words += ["--output", "out"]
         words += ["--page", "page.html"] if form == "text" else []
         code, _, err = call("audit", "odd.yaml", *SELECTED, *words)
         assert code == 1

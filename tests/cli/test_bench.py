@@ -20,7 +20,7 @@ from tests.cli.conftest import Call
 pytestmark = pytest.mark.usefixtures("few_objects")
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "bench"
-FAST = ("--rows", "8", "--threads", "1", "--budget", "1", "--only", "native")
+FAST = ("--rows", "8", "--threads", "1", "--budget", "1", "--select", "native")
 
 
 @pytest.fixture(autouse=True)
@@ -51,7 +51,7 @@ def test_the_report_says_all_that_was_found() -> None:
 
 
 def test_all_variants_are_listed_on_request() -> None:
-    lines = [*study_lines(made(), is_full=True)]
+    lines = [*study_lines(made(), is_verbose=True)]
     assert any(line.startswith("  native, points 1e-01") for line in lines)
     assert not any("something beats" in line for line in lines)
 
@@ -206,7 +206,7 @@ def test_what_libraries_print_is_no_part_of_the_answer(
         (("--seed", "-1"), "seed: 0 is the least, not -1"),
         (("--error", "2"), "an error of a strength lies in [0, 1], not at 2"),
         (("--peers", "absent"), "peers: 'absent' is not a Python module or package"),
-        (("--plot", "a.pdf"), "--plot a.pdf: a picture ends in .svg or .png"),
+        (("--picture", "a.pdf"), "--picture a.pdf: a picture ends in .svg or .png"),
     ],
 )
 def test_an_option_that_cannot_be_is_one_sentence(
@@ -217,7 +217,7 @@ def test_an_option_that_cannot_be_is_one_sentence(
 
 
 def test_an_unknown_candidate_is_one_sentence(call: Call) -> None:
-    code, out, err = call("bench", "grip.yaml", "--only", "nativ")
+    code, out, err = call("bench", "grip.yaml", "--select", "nativ")
     assert (code, out) == (2, "")
     assert err.startswith("no candidate 'nativ'; there is floor: the columns read once")
     assert "or all of tree, floor, " in err
@@ -228,7 +228,7 @@ def test_an_unknown_candidate_is_one_sentence(call: Call) -> None:
 @pytest.mark.heavy
 def test_what_a_model_does_not_have_can_be_skipped(call: Call) -> None:
     assert call("bench", "grip.yaml", "--skip", "rules", *FAST)[0] == 0
-    code, _, err = call("bench", "grip.yaml", "--only", "rules", "--budget", "1")
+    code, _, err = call("bench", "grip.yaml", "--select", "rules", "--budget", "1")
     assert code == 2
     assert err == (
         "no candidate is left to measure\n  fuzzytree bench --help lists the options\n"
@@ -248,7 +248,9 @@ def test_pictures_are_drawn_for_most_rows(
     pytest.importorskip("resvg_py")
     pytest.importorskip("font_roboto")
     monkeypatch.setattr(api, "bench", lambda *_, **__: made())
-    code, _, err = call("bench", "grip.yaml", "--plot", "a.svg", "--plot", "a.png")
+    code, _, err = call(
+        "bench", "grip.yaml", "--picture", "a.svg", "--picture", "a.png"
+    )
     assert code == 0
     assert err.splitlines()[:2] == ["wrote    a.svg", "wrote    a.png"]
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
@@ -259,7 +261,7 @@ def test_a_study_of_nothing_leaves_files_as_they_were(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Path("a.json").write_text("an earlier study", "utf-8")
-    words = ("bench", "grip.yaml", "--plot", "a.svg", "-o", "a.json")
+    words = ("bench", "grip.yaml", "--picture", "a.svg", "-o", "a.json")
     monkeypatch.setattr(api, "bench", lambda *_, **__: study())
     code, out, err = call(*words)
     assert (code, err) == (2, "nothing could be measured\n")
@@ -282,7 +284,7 @@ def test_a_place_that_cannot_be_written_is_reported_before_any_work(
     Path("file").touch()
     message = "file/such.json: cannot be written: 'file' is not a folder\n"
     assert call("bench", "grip.yaml", "-o", "file/such.json") == (2, "", message)
-    code, _, err = call("bench", "grip.yaml", "--plot", "file/such.svg")
+    code, _, err = call("bench", "grip.yaml", "--picture", "file/such.svg")
     assert (code, err) == (2, message.replace("json", "svg"))
 
 
@@ -291,7 +293,7 @@ def test_a_missing_extra_for_pictures_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "resvg_py", None)
     message = f"a PNG needs {install_hint('plots')}\n"
-    assert call("bench", "grip.yaml", "--plot", "a.png") == (2, "", message)
+    assert call("bench", "grip.yaml", "--picture", "a.png") == (2, "", message)
 
 
 def test_a_model_that_is_no_yaml_is_one_sentence(call: Call) -> None:

@@ -18,7 +18,7 @@ from fuzzytree.model.agreement import Agreement, Certified, Comparison
 from fuzzytree.report.text import agreement_lines
 from tests.cli.conftest import Call, grip
 
-NATIVE = ("--runtime", "native", "--limit", "200")
+NATIVE = ("--runtime", "native", "--generate", "200")
 
 
 @pytest.fixture(autouse=True)
@@ -92,7 +92,7 @@ def test_rows_that_do_not_fit_are_one_sentence(call: Call) -> None:
 
 def test_comparisons_that_agree_are_counted_unless_all_are_wanted(call: Call) -> None:
     short = call("check", "grip.yaml", *NATIVE)[1]
-    full = call("check", "grip.yaml", "--rows", *NATIVE)[1]
+    full = call("check", "grip.yaml", "--verbose", *NATIVE)[1]
     line = "calls of all kinds  2            0                   2 agree\n"
     assert line in short
     assert line not in full

@@ -73,7 +73,7 @@ def test_facts_are_printed_as_json(
     ("words", "message"),
     [
         (["collect", "part0.csv", "part0.csv"], "part0.csv is named more than once"),
-        (["collect", "part0.csv", "--columns", "ash,size"], "no column 'size'"),
+        (["collect", "part0.csv", "--inputs", "ash,size"], "no column 'size'"),
         (["collect", "part0.csv", "bad.csv"], "bad.csv has no column 'alcohol'"),
         (["collect", "part0.csv", "none.csv"], "none.csv: cannot be read"),
         (["learn", "part0.csv", "part1.csv"], "several tables: collect each of them"),

@@ -50,7 +50,7 @@ def test_what_was_read_written_and_proved_is_reported(call: Call) -> None:
 
 def test_the_next_command_works(call: Call) -> None:
     assert call("convert", "tipper.fll", "tipper.yaml", "--quiet") == (0, "", "")
-    code, out, err = call("check", "tipper.fll", "tipper.yaml", "--limit", "60")
+    code, out, err = call("check", "tipper.fll", "tipper.yaml", "--generate", "60")
     assert code == 0, out
     assert out.startswith("tipper: none of ")
     assert err == ""

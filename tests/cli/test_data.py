@@ -9,10 +9,10 @@ import pytest
 from tests.cli.conftest import Call
 
 VERBS = (
-    ("check", "grip.yaml", "--limit", "50", "--runtime", "native"),
-    ("stability", "grip.yaml", "--only", "N3", "--runtime", "native"),
+    ("check", "grip.yaml", "--generate", "50", "--runtime", "native"),
+    ("stability", "grip.yaml", "--select", "N3", "--runtime", "native"),
     ("needs", "grip.yaml"),
-    ("bench", "grip.yaml", "--rows", "2", "--budget", "5", "--only", "native"),
+    ("bench", "grip.yaml", "--rows", "2", "--budget", "5", "--select", "native"),
 )
 verbs = pytest.mark.parametrize("words", VERBS, ids=lambda words: words[0])
 

@@ -19,7 +19,9 @@ HEAVY = pytest.mark.heavy  # seconds to half a minute
 SLOW = ("audit", "stability")
 
 FIRST_LINES = {
-    "learn t.csv --target cultivar --columns 1 --leaves 4 -o t.yaml": "accuracy 0.8",
+    "learn t.csv --target cultivar --columns-per-node 1 --leaves 4 -o t.yaml": (
+        "accuracy 0.8"
+    ),
     "collect t.csv --target cultivar -o t.state": "collected 178 rows 13 columns, 3 ",
     "show wine.yaml": "wine: fuzzy tree, 3 nodes, 4 leaves, depth 2",
     "export wine.yaml -o wine.c": "wrote wine.c c, ",
@@ -36,7 +38,7 @@ FIRST_LINES = {
     "explain": "32 codes; `fuzzytree explain CODE` explains one",
     "explain FT203": "FT203 tree and raw rules differ (warning",
     "recheck audit.json wine.yaml": "the audit is right as far as it was checked",
-    "bench wine.yaml --budget 6 --rows 1 --threads 1 --only native": "",
+    "bench wine.yaml --budget 6 --rows 1 --threads 1 --select native": "",
     "needs wine.yaml": "wine: needs 3 of 13 columns; 3 parts can be left out",
     "stability wine.yaml": "wine: 10 of 11 stability checks pass, none fails (",
     "formats": "12 formats, 15 runtimes; no extra is missing",
@@ -52,7 +54,9 @@ def wine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the wine table, its tree, an audit and a damaged tree."""
     folder = tmp_path_factory.mktemp("wine")
     tree = ft.learn(
-        str(WINE), target="cultivar", settings=ft.LearningSettings(columns=1, leaves=4)
+        str(WINE),
+        target="cultivar",
+        settings=ft.LearningSettings(columns_per_node=1, leaves=4),
     )
     shutil.copy(WINE, folder / "t.csv")
     ft.save(tree, folder / "wine.yaml")

@@ -31,7 +31,7 @@ for words in {lines!r}:
     print(os.read(kept, 4096).decode())
     os.close(kept)
 """
-WIDE = ("--limit", "50", "--quiet")
+WIDE = ("--generate", "50", "--quiet")
 LEARN = (
     *("learn", "grasps.csv", "--target", "grip", "--ignore", "note", "--quiet"),
     *("-o", "learnt.yaml"),

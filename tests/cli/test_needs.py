@@ -48,7 +48,7 @@ def test_a_pruned_file_is_written_and_checks(call: Call) -> None:
     assert err == "wrote    left.yaml next: fuzzytree check tree.yaml left.yaml\n"
     assert ft.load("left.yaml") == pruned(random_tree(4, leaves=5)).model
     code, out, _ = call(
-        "check", "tree.yaml", "left.yaml", "--runtime", "native", "--limit", "200",
+        "check", "tree.yaml", "left.yaml", "--runtime", "native", "--generate", "200",
         "--verbose",
     )  # fmt: skip
     assert code == 0
@@ -58,7 +58,7 @@ def test_a_pruned_file_is_written_and_checks(call: Call) -> None:
 
 
 def test_a_tree_for_its_path_alone_keeps_its_cuts(call: Call) -> None:
-    code, out, _ = call("needs", "grip.yaml", "--for", "tree", "-o", "path.yaml")
+    code, out, _ = call("needs", "grip.yaml", "--use", "tree", "-o", "path.yaml")
     assert code == 0
     words = " ".join(out.split())
     assert "the flanks of term 'low' of 'force' only relative rules need them" in words
@@ -85,7 +85,7 @@ def test_what_is_dropped_on_request_is_said(call: Call) -> None:
 
 
 def test_json_reports_the_same_facts(call: Call) -> None:
-    code, out, err = call("needs", "grip.yaml", "--json", "--time", "0.2")
+    code, out, err = call("needs", "grip.yaml", "--json", "--budget", "0.2")
     facts = json.loads(out)
     assert (code, err) == (0, "")
     assert facts["ok"] is True
@@ -131,7 +131,7 @@ def test_a_pruned_model_that_differs_is_not_written(
     ("words", "message"),
     [
         (
-            ("needs", "grip.yaml", "--for", "raw"),
+            ("needs", "grip.yaml", "--use", "raw"),
             "uses: tree 'grip' carries no fitted sets, so it has no raw rules\n"
             "  fuzzytree needs --help lists the options\n",
         ),
@@ -151,8 +151,8 @@ def test_a_pruned_model_that_differs_is_not_written(
             "  fuzzytree needs --help lists the options\n",
         ),
         (
-            ("needs", "grip.yaml", "--time", "0"),
-            "invalid value for '--time': 0.0 is not in the range x>0.0\n"
+            ("needs", "grip.yaml", "--budget", "0"),
+            "invalid value for '--budget': 0.0 is not in the range x>0.0\n"
             "  fuzzytree needs --help lists the options\n",
         ),
     ],

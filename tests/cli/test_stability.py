@@ -37,7 +37,7 @@ def test_a_sound_model_holds(call: Call) -> None:
 def test_a_bulging_curve_fails(call: Call) -> None:
     bulge = LR(0.0, Side(1.0, (1.0,)), Side(1.0, (0.0, 1.5)))
     ft.save(one_rule(Term("odd", bulge)), "odd.yaml")
-    code, out, err = call("stability", "odd.yaml", "--only", "N7", *NATIVE)
+    code, out, err = call("stability", "odd.yaml", "--select", "N7", *NATIVE)
     assert code == 1
     assert out.splitlines()[-1].startswith("what to do: N7: learn with fewer points")
     assert "rules: a odd (right): the polynomial leaves [0, 1] by" in out
@@ -46,7 +46,7 @@ def test_a_bulging_curve_fails(call: Call) -> None:
 
 
 def test_json_reports_the_same_facts(call: Call) -> None:
-    words = ("stability", "rules.yaml", "--json", "--quiet", "--only", "N3", *NATIVE)
+    words = ("stability", "rules.yaml", "--json", "--quiet", "--select", "N3", *NATIVE)
     code, out, err = call(*words)
     facts = json.loads(out)
     assert (code, err) == (0, "")
@@ -59,7 +59,7 @@ def test_json_reports_the_same_facts(call: Call) -> None:
     ("words", "said"),
     [
         (
-            ("--only", "N99"),
+            ("--select", "N99"),
             "no criterion 'N99'; there is N1, N2, N2b, N3, N4, N5, N6, N7, N8, N9, N10",
         ),
         (("--runtime", "no"), "no runtime 'no'; there is reference, native"),

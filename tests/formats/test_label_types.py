@@ -42,7 +42,7 @@ def test_predictions_equal_the_labels_wherever_the_model_is(
     kind: str, tmp_path: Path
 ) -> None:
     y = LABELS[kind]
-    tree = ft.learn(VALUES, target=y, settings=ft.LearningSettings(columns=1))
+    tree = ft.learn(VALUES, target=y, settings=ft.LearningSettings(columns_per_node=1))
     rules = ft.rules_from_tree(tree)
     ft.save(tree, tmp_path / "tree.yaml")
     ft.save(rules, tmp_path / "rules.fcl", allow_loss=True)
@@ -65,7 +65,7 @@ def test_predictions_equal_the_labels_wherever_the_model_is(
 @pytest.mark.parametrize("kind", ["integers", "booleans", "whole floats", "names"])
 def test_the_tree_of_a_classifier_predicts_its_labels(kind: str) -> None:
     y = LABELS[kind]
-    model = ft.FuzzyTreeClassifier(columns=1).fit(VALUES, y)
+    model = ft.FuzzyTreeClassifier(columns_per_node=1).fit(VALUES, y)
     assert (
         np.array(ft.run(model.tree_, VALUES).classes) == model.predict(VALUES)
     ).all()
@@ -101,7 +101,7 @@ def test_numbers_of_a_csv_file_are_numbers_where_python_writes_them_so(
         writer.writerow(["a", "y"])
         names = np.repeat(labels, 8).tolist()
         writer.writerows(zip(VALUES[:, 0], names, strict=True))
-    tree = ft.learn(path, target="y", settings=ft.LearningSettings(columns=1))
+    tree = ft.learn(path, target="y", settings=ft.LearningSettings(columns_per_node=1))
     found = ft.run(tree, path)
     assert found.classes == np.repeat(np.array(expected, object), 8).tolist()
     assert [*map(type, found.classes)] == [type(e) for e in expected for _ in range(8)]

@@ -81,7 +81,7 @@ def wines() -> Iterator[Case]:
         found = audit(
             Material(tree, rows=rows),
             settings=SETTINGS,
-            selection=AuditSelection(ignore=LEFT_OUT[:1]),
+            selection=AuditSelection(skip=LEFT_OUT[:1]),
         )
         count = len(tree.leaves)
         yield Case(f"wine, {name} features", "tree", count, count, found)
@@ -97,7 +97,7 @@ def others() -> Iterator[Case]:
 
 def _case(name: str, kind: str, model: Document) -> Case:
     found = audit(
-        Material(model), settings=SETTINGS, selection=AuditSelection(ignore=LEFT_OUT)
+        Material(model), settings=SETTINGS, selection=AuditSelection(skip=LEFT_OUT)
     )
     audited = set(view(model, found.domain).numbers)
     count = len(getattr(model, "rules", ()))

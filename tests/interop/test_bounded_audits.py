@@ -43,7 +43,7 @@ def test_what_is_told_of_real_files_holds_on_a_grid(
         files += 1
         found = audit(
             Material(system),
-            selection=AuditSelection(select=["FT1", "FT2", "FT3"], ignore=LEFT_OUT),
+            selection=AuditSelection(select=["FT1", "FT2", "FT3"], skip=LEFT_OUT),
         )
         checked += check_on_grid(
             system, found, seen, STEPS.get(len(found.domain.sides), 3)

@@ -73,7 +73,9 @@ def test_the_wine_rules_decide_alike_on_every_row(
     kind: Kind,
     dialect: Dialect,
 ) -> None:
-    tree = learn(WINE, target="cultivar", settings=LearningSettings(columns=columns))
+    tree = learn(
+        WINE, target="cultivar", settings=LearningSettings(columns_per_node=columns)
+    )
     assert any(v.parts for v in tree.variables) == is_mixed
     rules = rules_from_tree(tree, kind)
     rows = _wine_rows(rules.inputs)

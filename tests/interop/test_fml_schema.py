@@ -67,7 +67,10 @@ def test_the_wine_rules_are_valid_and_whole(
     lxml: Any, kind: Kind, columns: int | None
 ) -> None:
     rules = rules_from_tree(
-        learn(WINE, target="cultivar", settings=LearningSettings(columns=columns)), kind
+        learn(
+            WINE, target="cultivar", settings=LearningSettings(columns_per_node=columns)
+        ),
+        kind,
     )
     root = validated(lxml, write(rules, allow_loss=True, tolerance=1e-4).content)
     assert len(root.findall(f".//{{{NAMESPACE}}}tskRule")) == len(rules.rules) + 1

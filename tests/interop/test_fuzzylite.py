@@ -106,7 +106,9 @@ def assert_decided_alike(
 def test_the_wine_rules_decide_alike_on_every_row(
     engine: Engine, columns: int | None, is_mixed: bool, kind: Kind, scores: Scores
 ) -> None:
-    tree = learn(WINE, target="cultivar", settings=LearningSettings(columns=columns))
+    tree = learn(
+        WINE, target="cultivar", settings=LearningSettings(columns_per_node=columns)
+    )
     assert any(v.parts for v in tree.variables) == is_mixed
     rules = rules_from_tree(tree, kind)
     rows = wine_rows(rules.inputs)

@@ -304,7 +304,7 @@ def test_compiled_c_answers_the_wine_table_as_native(
 ) -> None:
     program("gcc")
     tree = ft.learn(
-        WINE, target="cultivar", settings=ft.LearningSettings(columns=columns)
+        WINE, target="cultivar", settings=ft.LearningSettings(columns_per_node=columns)
     )
     found = ft.check(tree, data=None, runtimes=["native", "c", "c best-first"])
     assert found.ok
@@ -321,7 +321,7 @@ def test_compiled_c_has_the_strengths_of_every_rule_on_every_wine(
 ) -> None:
     program("gcc")
     tree = ft.learn(
-        WINE, target="cultivar", settings=ft.LearningSettings(columns=columns)
+        WINE, target="cultivar", settings=ft.LearningSettings(columns_per_node=columns)
     )
     assert any(v.parts for v in tree.variables) == (columns is None)
     relative, raw = rules_from_tree(tree), rules_from_tree(tree, "raw")

@@ -67,7 +67,7 @@ def test_the_wine_rules_have_the_same_scores_in_octave_and_decide_alike(
     told: dict[str, tuple[RuleBase, list[dict[str, float]]]] = {}
     for columns in (None, 1):
         tree = learn(
-            WINE, target="cultivar", settings=LearningSettings(columns=columns)
+            WINE, target="cultivar", settings=LearningSettings(columns_per_node=columns)
         )
         assert any(v.parts for v in tree.variables) == (columns is None)
         kinds: tuple[Kind, ...] = ("relative", "raw")
@@ -121,7 +121,9 @@ def test_the_wine_rules_have_the_same_scores_in_fuzzylite(
     program: Need, tmp_path: Path, kind: Kind, columns: int | None, is_mixed: bool
 ) -> None:
     fuzzylite = program("fuzzylite")
-    tree = learn(WINE, target="cultivar", settings=LearningSettings(columns=columns))
+    tree = learn(
+        WINE, target="cultivar", settings=LearningSettings(columns_per_node=columns)
+    )
     assert any(v.parts for v in tree.variables) == is_mixed
     rules = rules_from_tree(tree, kind)
     with WINE.open(newline="", encoding="utf-8") as file:

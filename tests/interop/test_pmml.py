@@ -70,7 +70,9 @@ def test_the_wine_tree_and_its_rules_answer_alike_on_every_row(
     library: Any, columns: int | None, is_mixed: bool
 ) -> None:
     library("jpmml_evaluator")
-    tree = learn(WINE, target="cultivar", settings=LearningSettings(columns=columns))
+    tree = learn(
+        WINE, target="cultivar", settings=LearningSettings(columns_per_node=columns)
+    )
     assert any(v.parts for v in tree.variables) == is_mixed
     models: list[FuzzyTree | RuleBase] = [tree]
     models += [rules_from_tree(tree, kind) for kind in KINDS]

@@ -47,7 +47,7 @@ def test_audits_of_real_files_hold_and_their_numbers_cannot_be_edited(
         found = audit(
             Material(model, file=file),
             settings=AuditSettings(budget_s=3.0),
-            selection=AuditSelection(ignore=LEFT_OUT),
+            selection=AuditSelection(skip=LEFT_OUT),
         )
         text = msgspec.json.encode(found)
         report = recheck(text, content.content, ("a.json", "m.yaml"))

@@ -241,7 +241,7 @@ def test_held_out_rows_choose_what_splits_the_nodes() -> None:
     )
     assert report.inner_accuracy is not None
     assert report.inner_accuracy > 0.93
-    alone = learn(values, labels, LearningSettings(columns=1)).report
+    alone = learn(values, labels, LearningSettings(columns_per_node=1)).report
     assert alone.chosen == {"splits": "single columns"}
     assert set(alone.features_per_node) == {1}
 
@@ -250,14 +250,14 @@ def test_held_out_rows_choose_what_splits_the_nodes() -> None:
 def test_a_tree_has_no_more_leaves_than_it_may(leaves: int) -> None:
     values, labels = datasets.load_digits(return_X_y=True)
     found = learn(
-        values[:600], labels[:600], LearningSettings(leaves=leaves, columns=1)
+        values[:600], labels[:600], LearningSettings(leaves=leaves, columns_per_node=1)
     )
     assert found.report.leaves == leaves
 
 
 def test_a_leaf_has_so_many_rows_and_a_path_so_many_conditions() -> None:
     values, labels = datasets.load_digits(return_X_y=True)
-    settings = LearningSettings(min_rows=25, depth=3, columns=1)
+    settings = LearningSettings(min_rows=25, depth=3, columns_per_node=1)
     tree = learn(values[:600], labels[:600], settings).tree
     assert min(leaf.support or 0 for leaf in tree.leaves) >= 25
     assert len(tree.leaves) <= 8

@@ -34,8 +34,8 @@ from fuzzytree.learning import LearningSettings
             "the cost of 'x' is finite and at least 0, not -1.0",
         ),
         (
-            {"columns": 0},
-            "columns is at least 1, not 0",
+            {"columns_per_node": 0},
+            "columns_per_node is at least 1, not 0",
         ),
         (
             {"alpha": 0.5},

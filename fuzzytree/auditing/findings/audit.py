@@ -99,7 +99,7 @@ def audit(
     model, rows, file = material.model, material.rows, material.file
     selection, settings = selection or AuditSelection(), settings or AuditSettings()
     check_settings(settings)
-    wanted = chosen_codes(selection.select, selection.ignore)
+    wanted = chosen_codes(selection.select, selection.skip)
     if row is not None:
         _check_row(row, model.inputs)
     viewed = view(model, domain or domain_of(model))

@@ -4,7 +4,7 @@ Both can stand in a file beside the model, `fuzzytree-audit.yaml`:
 
 ```yaml
 select: [FT1, FT301]
-ignore: [FT103]
+skip: [FT103]
 limits:
   - {variable: alcohol, from: 11, to: 15}
 settings: {epsilon: 0.2, budget: 120}
@@ -48,7 +48,7 @@ _COUNTS: Mapping[str, tuple[int, int]] = {
 }
 
 
-def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[str]:
+def chosen_codes(select: Sequence[str] = (), skip: Sequence[str] = ()) -> set[str]:
     """Return the selected codes, and all reasons for declining.
 
     The reasons are always included: without them the other answers seem to be about
@@ -62,13 +62,13 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
         >>> sorted(chosen_codes(["FT10"], ["FT102", "FT103"]))[:5]
         ['FT101', 'FT104', 'FT105', 'FT106', 'FT107']
     """
-    select, ignore = as_names(select), as_names(ignore)
-    for text in (*select, *ignore):
+    select, skip = as_names(select), as_names(skip)
+    for text in (*select, *skip):
         if not text or not any(code.startswith(text) for code in CODES):
             raise ValueError(
                 f"no code begins with {text!r}; {name_choice(text, [*CODES])}"
             )
-    for text in ignore:
+    for text in skip:
         if text.startswith("FTD"):
             raise ValueError(
                 f"the code {text!r} cannot be left out: it reports what was declined"
@@ -78,10 +78,10 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
         code
         for code in CODES
         if code.startswith("FTD")
-        or (code.startswith(taken) and not code.startswith(ignore))
+        or (code.startswith(taken) and not code.startswith(skip))
     }
     if all(code.startswith("FTD") for code in codes):
-        raise ValueError("select and ignore leave no code to answer")
+        raise ValueError("select and skip leave no code to answer")
     return codes
 
 
@@ -179,7 +179,7 @@ class Configuration(FileRecord, frozen=True, kw_only=True):
 
     noun: ClassVar[str] = "a configuration"
     select: _Codes = ()
-    ignore: _Codes = ()
+    skip: _Codes = ()
     limits: Annotated[tuple[LimitsOfFile, ...], Meta(max_length=10_000)] = ()
     settings: SettingsOfFile | None = None
     baseline: Name | None = None
@@ -232,7 +232,7 @@ def _wrong(bound: Configuration) -> Iterator[tuple[Path, str]]:
             yield ("settings", "budget" if name == "budget_s" else name), str(error)
     for position, fault in _wrong_limits(bound.limits):
         yield ("limits", position), fault
-    for key in ("select", "ignore"):
+    for key in ("select", "skip"):
         for position, text in enumerate(getattr(bound, key)):
             try:
                 chosen_codes([text])

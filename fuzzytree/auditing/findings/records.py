@@ -107,12 +107,12 @@ class AuditSelection(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         select: Beginnings of the codes to examine, such as `FT1`; all if empty.
-        ignore: Beginnings of the codes to leave out.
+        skip: Beginnings of the codes to leave out.
         accepted: Ids of findings that a baseline accepts.
     """
 
     select: Sequence[str] = ()
-    ignore: Sequence[str] = ()
+    skip: Sequence[str] = ()
     accepted: Collection[str] = ()
 
 

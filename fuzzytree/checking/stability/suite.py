@@ -45,7 +45,7 @@ def examine(
     runtimes: Sequence[Runtime],
     formats: Sequence[Format],
     data: FloatArray | None = None,
-    only: Sequence[str] = (),
+    select: Sequence[str] = (),
     progress: Progress = lambda _text, _share: None,
 ) -> Stability:
     """Apply the criteria N1 to N10 to a model.
@@ -55,7 +55,7 @@ def examine(
         runtimes: What to run; those that are not installed are named and left out.
         formats: What to write and take back.
         data: Rows of one's own, shape (inputs, rows); at most 1,000, evenly drawn.
-        only: The codes of criteria to apply; all if empty. `N2` includes `N2b`.
+        select: The codes of criteria to apply; all if empty. `N2` includes `N2b`.
         progress: Called with the current check and the share that is done, in [0, 1].
 
     Returns:
@@ -69,12 +69,12 @@ def examine(
         >>> from fuzzytree.testing import random_tree
         >>> found = examine(
         ...     random_tree(1, leaves=3), runtimes=[find_runtime("native")],
-        ...     formats=(), only=["N3"],
+        ...     formats=(), select=["N3"],
         ... )
         >>> [one.verdict for one in found.criteria]
         ['holds']
     """
-    wanted = _wanted(only)
+    wanted = _wanted(select)
     rows = _checked(data, len(model.inputs))
     probes = probe_values(model, _PROBES)
     values = np.concatenate([probes, _thinned(rows, _DATA)], axis=1)
@@ -128,11 +128,11 @@ def examine(
     )
 
 
-def _wanted(only: Sequence[str]) -> tuple[str, ...]:
-    only = as_names(only)
-    codes = [code.upper().replace("B", "b") for code in only]
+def _wanted(select: Sequence[str]) -> tuple[str, ...]:
+    select = as_names(select)
+    codes = [code.upper().replace("B", "b") for code in select]
     known = ", ".join(TITLES)
-    for text, code in zip(only, codes, strict=True):
+    for text, code in zip(select, codes, strict=True):
         if code not in TITLES:
             raise ValueError(f"no criterion {text!r}; there is {known}")
     if "N2" in codes:

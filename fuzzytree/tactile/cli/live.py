@@ -69,7 +69,7 @@ class TactileLiveOptions:
     lines: bool = flag("--lines", "Print lines, also on a terminal.")
     as_json: bool = flag("--json", "Print each line as JSON.")
     page: int | None = option(
-        "--page [PORT]",
+        "--serve [PORT]",
         "Serve a page on this computer; a free port if none is named.",
         is_flag=False,
         flag_value=0,

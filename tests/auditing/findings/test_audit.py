@@ -156,7 +156,7 @@ def test_codes_that_are_left_out_are_reported() -> None:
     found = audit(
         Material(grip()),
         domain=FAR,
-        selection=AuditSelection(select=["FT10"], ignore=["FT102"]),
+        selection=AuditSelection(select=["FT10"], skip=["FT102"]),
     )
     codes = {one.code for one in found.answers}
     assert "FT101" in codes

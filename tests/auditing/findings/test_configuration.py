@@ -28,7 +28,7 @@ from tests.cli.conftest import grip
 
 WHOLE = b"""\
 select: [FT1, FT301]
-ignore: [FT103]
+skip: [FT103]
 limits:
 - {variable: force, from: 1, to: 5.5}
 settings: {epsilon: 0.2, budget: 120, rows: 10}
@@ -41,7 +41,7 @@ def test_a_whole_configuration_is_read() -> None:
     whole = configuration(WHOLE, "x.yaml")
     assert whole == Configuration(
         select=("FT1", "FT301"),
-        ignore=("FT103",),
+        skip=("FT103",),
         limits=(LimitsOfFile(variable="force", from_=1.0, to=5.5),),
         settings=SettingsOfFile(epsilon=0.2, budget_s=120.0, rows=10),
         baseline="accepted.json",
@@ -59,9 +59,9 @@ def test_an_empty_mapping_changes_nothing() -> None:
     ("content", "message"),
     [
         (
-            b"ignoer: [FT1]\nfail-on: waring\n",
-            "x.yaml:1:1: a configuration has no key 'ignoer'; there is select, ignore, "
-            "limits, settings, baseline, fail-on (did you mean 'ignore'?)\n"
+            b"skpi: [FT1]\nfail-on: waring\n",
+            "x.yaml:1:1: a configuration has no key 'skpi'; there is select, skip, "
+            "limits, settings, baseline, fail-on (did you mean 'skip'?)\n"
             "x.yaml:2:10: 'fail-on' must be 'error' or 'info' or 'never' or 'warning', "
             "not 'waring'",
         ),
@@ -87,10 +87,10 @@ def test_an_empty_mapping_changes_nothing() -> None:
         (b"", "x.yaml:1:1: the file is empty"),
         (
             b"a: &x 1\nb: *x\n",
-            "x.yaml:1:1: a configuration has no key 'a'; there is select, ignore, "
+            "x.yaml:1:1: a configuration has no key 'a'; there is select, skip, "
             "limits, settings, baseline, fail-on\n"
             "x.yaml:1:4: anchors are not read; leave out '&x'\n"
-            "x.yaml:2:1: a configuration has no key 'b'; there is select, ignore, "
+            "x.yaml:2:1: a configuration has no key 'b'; there is select, skip, "
             "limits, settings, baseline, fail-on\n"
             "x.yaml:2:4: aliases are not read; repeat the value",
         ),

@@ -256,7 +256,7 @@ def answers(model: Document) -> tuple[AuditAnswer, ...]:
         model,
         data=None if data is None else ft.table(data, columns=columns),
         domain=ft.AuditDomain(limits=limits),
-        selection=ft.AuditSelection(ignore=["FT6"]),
+        selection=ft.AuditSelection(skip=["FT6"]),
     )
     assert found.is_complete
     return found.answers

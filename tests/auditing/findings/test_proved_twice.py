@@ -26,7 +26,7 @@ from tests.auditing.diff.test_system_numbers import tipper
 from tests.auditing.engine.bases import Kind, random_base
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-WITHOUT_RUNTIMES = AuditSelection(ignore=["FT6"])
+WITHOUT_RUNTIMES = AuditSelection(skip=["FT6"])
 
 
 def audited(model: Document, content: bytes | None = None) -> Audit:

@@ -292,7 +292,7 @@ def test_what_is_proved_of_the_tipper_and_the_wines_is_decided_again() -> None:
     for model in (learn("examples/wine/wine.csv", target="cultivar"), tipper):
         content = yaml.write(model).content
         material = Material(model, model_file("m.yaml", content))
-        found = audit(material, selection=AuditSelection(ignore=["FT6", "FT7"]))
+        found = audit(material, selection=AuditSelection(skip=["FT6", "FT7"]))
         report = recheck(msgspec.json.encode(found), content, ("a.json", "m.yaml"))
         assert report.wrong == []
         assert "PROVED" not in {state for state, _ in report.undecided}

@@ -48,7 +48,9 @@ FAST = [find_runtime(name) for name in ("native", "native float32", "best-first"
 def wine() -> FuzzyTree:
     table = ROOT / "examples" / "wine" / "wine.csv"
     return ft.learn(
-        str(table), target="cultivar", settings=ft.LearningSettings(columns=1, leaves=4)
+        str(table),
+        target="cultivar",
+        settings=ft.LearningSettings(columns_per_node=1, leaves=4),
     )
 
 
@@ -145,14 +147,14 @@ def test_numbers_at_the_ends_of_double_can_be_examined(name: str) -> None:
 
 
 def test_only_selected_checks_are_applied() -> None:
-    result = examine(small_rules(), runtimes=FAST, formats=(), only=["n3", "N2"])
+    result = examine(small_rules(), runtimes=FAST, formats=(), select=["n3", "N2"])
     assert [one.code for one in result.criteria] == ["N2", "N2b", "N3"]
     assert set(TITLES) >= {one.code for one in result.criteria}
 
 
 def test_an_unknown_criterion_is_refused() -> None:
     with pytest.raises(ValueError, match="no criterion") as caught:
-        examine(small_rules(), runtimes=FAST, formats=(), only=["N11"])
+        examine(small_rules(), runtimes=FAST, formats=(), select=["N11"])
     assert str(caught.value) == (
         "no criterion 'N11'; there is N1, N2, N2b, N3, N4, N5, N6, N7, N8, N9, N10"
     )
@@ -212,7 +214,7 @@ def test_an_input_whose_terms_only_step_has_no_spread() -> None:
     (result,) = stiffness(rules, np.array([[0.5, 1.0, 1.5]]), is_data=True)
     assert (result.spread, result.ratio) == (None, None)
     assert result.advice == "float32 is safe"
-    study = examine(rules, runtimes=FAST, formats=(), only=["N3"])
+    study = examine(rules, runtimes=FAST, formats=(), select=["N3"])
     jsonschema.validate(json.loads(study.to_json()), SCHEMA)
 
 
@@ -250,5 +252,5 @@ def test_a_learnt_tree_passes_with_what_stands_for_missing_values() -> None:
     tree = ft.learn(str(table), target="cultivar")
     assert all(variable.missing is not None for variable in tree.variables[:1])
     only = ["N1", "N2b", "N6"]
-    found = ft.stability(tree, only=only, runtimes=["native", "native float32"])
+    found = ft.stability(tree, select=only, runtimes=["native", "native float32"])
     assert {c.verdict for c in found.criteria if c.code in only} == {"holds"}
