@@ -141,9 +141,9 @@ def _sentences(
         else:
             nearest = min(known, key=lambda one: one.error)
             yield (
-                f"{_where(question, rows)}: nothing measured keeps "
-                f"{_level(nearest, most)}; the nearest is {nearest.short} "
-                f"with {smallest:.2g}"
+                f"{_where(question, rows)}: nothing measured is "
+                f"{_level(nearest, most)}; the nearest is {nearest.short} with "
+                f"{smallest:.2g}"
             )
         return
     before: FrontEntry | None = None
@@ -188,7 +188,7 @@ def _sentence(
     """
     best = _choice(known, question, level)
     others = [one for one in known if one.error <= level and one.name != best.name]
-    head = f"{_where(question, rows)}: for {_level(best, level)}, use {_what(best)}"
+    head = f"{_where(question, rows)}: fastest {_level(best, level)}: {_what(best)}"
     other = _default(known, question)
     if other is None or best.name == other.name:
         other = others[0] if others else None
@@ -201,10 +201,10 @@ def _sentence(
     if ratio.confidence < CONFIDENCE:
         sure = "in too few rounds to be sure"
     elif ratio.low > 1.0:
-        times = f"{_times(ratio.median)} times faster than {other.short}"
-        return f"{head}: {times} ({sure})"
+        times = f"{_times(ratio.median)} times as fast as {other.short}"
+        return f"{head}, {times} ({sure}){_at_cuts(best)}"
     took = f"{other.short} takes {_times(ratio.median)} times as long"
-    return f"{head}: nothing is surely faster ({took}, {sure})"
+    return f"{head}; nothing is surely faster ({took}, {sure}){_at_cuts(best)}"
 
 
 def _what(best: FrontEntry) -> str:
@@ -224,13 +224,19 @@ def _level(best: FrontEntry, level: float) -> str:
     """Say what is demanded, and for a tree on how many rows it was seen."""
     error = best.point.error
     if best.point.question != "tree" or error is None:
-        return f"an error of at most {level:g}"
-    where = f"in {error.rows:,} row{'' if error.rows == 1 else 's'}"
+        return f"within an error of {level:g}"
+    changed = "without a changed class"
+    if level > 0.0:
+        changed = f"with at most {level:.2%} of classes changed"
+    return f"{changed} in {error.rows:,} row{'' if error.rows == 1 else 's'}"
+
+
+def _at_cuts(best: FrontEntry) -> str:
+    """Say how many of the rows that lie on a cut of a tree change their class."""
     edges = best.point.probes
-    if edges is not None and edges.flips:
-        where += f" (but {edges.flips} of {edges.rows} probes at its cuts)"
-    changed = "no class" if level == 0.0 else f"at most {level:.2%} of classes"
-    return f"{changed} changed {where}"
+    if best.point.question != "tree" or edges is None or not edges.flips:
+        return ""
+    return f"; changed in {edges.flips} of {edges.rows} rows generated at its cuts"
 
 
 def _times(ratio: float) -> str:

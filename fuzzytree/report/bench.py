@@ -21,12 +21,12 @@ from fuzzytree.report.text import aligned, counted, digits, duration, more_line,
 from fuzzytree.runtimes import baseline
 
 _HEAD = (
-    *("time a row", "+-", "speed", "floor x"),
-    *("error", "certified", "flips", "at edges"),
+    *("time per row", "+-", "speed", "floor x"),
+    *("error", "certified", "changed", "at edges"),
 )
 _UNBEATEN = (
-    *("computes", "rows", "threads", "fastest unbeaten", "time a row", "speed"),
-    *("error", "certified", "flips"),
+    *("computes", "rows", "threads", "fastest", "time per row", "speed"),
+    *("error", "certified", "changed"),
 )
 _MOST_UNBEATEN = 18  # rows of the short table
 Timed = dict[str, tuple[Point, Timing]]
@@ -36,7 +36,7 @@ _LEGEND = (
     "* no candidate is both faster and more exact; +- the 95 % interval of the median;",
     "speed: times as fast as the default runtime; floor x: as reading the columns;",
     "error: the largest of a strength, observed; certified: the bound of it;",
-    "flips: other classes than exact arithmetic gives, at edges: on rows aimed there",
+    "changed: classes other than those of exact arithmetic; at edges: in rows on a cut",
 )
 
 

@@ -331,7 +331,7 @@ def _legend(
     for kind in _KINDS:
         if kind in kinds:
             signs.append((kind, marker(kind, 9, -4, "grey", is_full=False)))
-    signs.append(("unbeaten", marker("runtime", 9, -4, "grey", is_full=True)))
+    signs.append(("best trade-off", marker("runtime", 9, -4, "grey", is_full=True)))
     if has_floors:
         signs.append(("floor", mark("line", 0, 18, -4, -4, "floor")))
     left = _LEFT

@@ -155,7 +155,7 @@ def test_a_candidate_is_timed_and_judged() -> None:
     assert study.is_complete
     assert study.fingerprint
     assert study.advice == (
-        "rules, 4 rows: for an error of at most 0.01, use ours, the only one",
+        "rules, 4 rows: fastest within an error of 0.01: ours, the only one",
     )
 
 

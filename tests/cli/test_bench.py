@@ -75,7 +75,9 @@ def test_a_study_goes_to_stdout_with_its_advice_first(call: Call) -> None:
     code, out, err = call("bench", "grip.yaml", "--data", "grasps.csv", *FAST)
     assert code == 0
     lines = out.splitlines()
-    assert lines[0].startswith("tree, 8 rows: for no class changed in 4 rows")
+    assert lines[0].startswith(
+        "tree, 8 rows: fastest without a changed class in 4 rows"
+    )
     assert "grip: grasps.csv, 4 rows, repeated to make 8; " in out
     starts = [line.split("  ")[0] for line in lines]
     assert {"computes", "tree", "relative rules"} <= {*starts}
@@ -150,7 +152,7 @@ def test_quiet_says_nothing_but_the_study(call: Call) -> None:
 def test_a_wanted_error_is_in_the_advice(call: Call) -> None:
     _, out, _ = call("bench", "rules.yaml", "--error", "1e-4", *FAST)
     first = " ".join(out.split()).partition("rules, 8 rows: ")[2]
-    assert first.startswith("for an error of at most 0.0001, use native")
+    assert first.startswith("fastest within an error of 0.0001: native")
 
 
 def test_an_interrupted_study_is_reported_and_exits_with_130(
@@ -160,7 +162,7 @@ def test_an_interrupted_study_is_reported_and_exits_with_130(
     monkeypatch.setattr(api, "bench", lambda *_, **__: found)
     code, out, err = call("bench", "grip.yaml", "-o", "study.json")
     assert code == 130
-    assert out.startswith("rules, 1,000 rows: for an error of at most 1e-15")
+    assert out.startswith("rules, 1,000 rows: fastest within an error of 1e-15")
     assert json.loads(Path("study.json").read_bytes())["is_interrupted"] is True
     assert (
         err.splitlines()[-1] == "interrupted; the result has what was measured before"

@@ -123,9 +123,16 @@ def test_an_error_of_0_lies_on_a_line_that_says_so() -> None:
 
 def test_a_legend_explains_what_there_is() -> None:
     said = [text for text, *_ in words(small(), "axis-name")][5:]
-    assert said == ["tree", "raw rules", "runtime", "peer", "unbeaten", "floor"]
+    assert said == [
+        "tree",
+        "raw rules",
+        "runtime",
+        "peer",
+        "best trade-off",
+        "floor",
+    ]
     bare = [text for text, *_ in words(study(point("a", 1e5, error(0.1))), "axis-name")]
-    assert bare[3:] == ["rules", "runtime", "unbeaten"]
+    assert bare[3:] == ["rules", "runtime", "best trade-off"]
 
 
 def test_the_front_is_filled_bold_and_shows_what_was_observed_below_its_bound() -> None:
