@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -13,8 +14,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
+
+import fuzzytree as ft
 
 ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = ROOT / "examples"
+EXPRESSION = r"\$\{\{ ([\w.-]+) \}\}"  # of a workflow
 HOMES = {
     "fuzzytree": "fuzzytree",
     "exporters": "fuzzytree.exporters",
@@ -131,6 +137,91 @@ def test_wheel_and_source_archive_hold_every_module_and_every_data_file(
     with tarfile.open(archive) as packed:
         names = {name.split("/", 1)[-1] for name in packed.getnames()}
     assert {"LICENSE", "README.md", "exporters/__init__.py"} <= names
+
+
+@pytest.mark.heavy
+def test_the_hook_for_pre_commit_fails_for_the_file_with_a_finding(
+    tmp_path: Path,
+) -> None:
+    project, home = tmp_path / "project", tmp_path / "home"
+    project.mkdir()
+    for name in ("grip file.fcl", "tipper.fll", "grip.yaml"):
+        model = "tipper.fll" if "tipper" in name else "grip.yaml"
+        ft.save(ft.load(EXAMPLES / model), project / name)
+    for words in (["init", "--quiet"], ["add", "."]):
+        _run(["git", *words], project)
+    hook = ["env", f"PRE_COMMIT_HOME={home}", sys.executable, "-m", "pre_commit"]
+    words = ["try-repo", str(ROOT), "fuzzytree-audit", "--all-files"]
+    done = _run([*hook, *words], project, expected=1)
+    assert ": FT101 error: rule 4 never wins" in done.stdout
+    assert "tipper: audited as system" in done.stdout  # though another one failed
+    assert "grip.yaml" not in done.stdout
+
+
+@pytest.mark.heavy
+def test_the_action_audits_and_compares_as_sarif(tmp_path: Path) -> None:
+    (tmp_path / "fuzzytree").symlink_to(sys.prefix)
+    old, new = EXAMPLES / "grip.yaml", tmp_path / "new grip.yaml"
+    text = old.read_text("utf-8")
+    new.write_text(text.replace("[1.0, 0.0], [1.2, 1.0]", "[0.5, 0.0], [0.8, 1.0]"))
+    assert text != new.read_text("utf-8")
+    done = _action(tmp_path, {"model": str(old), "fail-on": "never"})
+    assert "\n11 findings: 1 error, " in done.stderr
+    assert not (tmp_path / "fuzzytree-sarif" / "diff.sarif").exists()
+    more = {"fail-on": "never", "old": str(old), "sarif": "to/sarif"}
+    _action(tmp_path, {"model": str(new), **more}, expected=1)
+    wrong = _action(tmp_path, {"model": "none.yaml"}, expected=2)
+    assert wrong.stderr == "none.yaml: cannot be read: no such file or directory\n"
+    for name, codes in (("audit", {"FT101"}), ("diff", {"FT801", "FT802"})):
+        path = tmp_path / "to" / "sarif" / f"{name}.sarif"
+        [run] = json.loads(path.read_text("utf-8"))["runs"]
+        assert codes <= {result["ruleId"] for result in run["results"]}
+        for result in run["results"]:
+            [location] = result["locations"]
+            assert location["physicalLocation"]["artifactLocation"]["uri"]
+
+
+@pytest.mark.heavy
+def test_the_action_installs_what_it_runs(tmp_path: Path) -> None:
+    source = _copy_of_the_project(tmp_path / "source")
+    _action(tmp_path, {"model": str(EXAMPLES / "tipper.fll")}, source, steps=2)
+    assert (tmp_path / "fuzzytree-sarif" / "audit.sarif").is_file()
+
+
+def test_the_citation_has_what_the_format_requires() -> None:
+    facts = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= {*facts}
+    assert all(author["name"] for author in facts["authors"])
+    project = _project()["project"]
+    assert (facts["version"], facts["license"]) == (
+        project["version"],
+        project["license"],
+    )
+
+
+def _action(
+    folder: Path,
+    inputs: dict[str, str],
+    source: Path = ROOT,
+    *,
+    steps: int = 1,
+    expected: int = 0,
+) -> subprocess.CompletedProcess[str]:
+    """Run the last steps of the GitHub Action as a runner does."""
+    action = yaml.safe_load((ROOT / "action.yml").read_text("utf-8"))
+    values = {f"inputs.{k}": v.get("default", "") for k, v in action["inputs"].items()}
+    values |= {f"inputs.{name}": value for name, value in inputs.items()}
+    values["github.action_path"] = str(source)
+    for step in action["runs"]["steps"][-steps:]:
+        words = [
+            f"{name}={re.sub(EXPRESSION, lambda match: values[match[1]], text)}"
+            for name, text in step["env"].items()
+        ]
+        shell = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", step["run"]]
+        done = _run(
+            ["env", f"RUNNER_TEMP={folder}", *words, *shell], folder, expected=expected
+        )
+    return done
 
 
 def _project() -> dict[str, Any]:
