@@ -168,7 +168,10 @@ def audit_verdict(audit: Audit, gone: Collection[str] = ()) -> str:
 
 
 def found_text(audit: Audit) -> str:
-    """Return how many findings of each severity an audit has that are not accepted."""
+    """Return how many findings of each severity an audit has that are not accepted.
+
+    And how many of them `recheck` did not decide again, which are no errors.
+    """
     findings = audit.open_findings
     severities = Counter(one.severity for one in findings)
     listed = ", ".join(
@@ -176,7 +179,8 @@ def found_text(audit: Audit) -> str:
         for one, noun in SEVERITIES.items()
         if severities[one]
     )
-    said = f"{counted(len(findings), 'finding')}: {listed}"
+    weak = f" ({audit.unconfirmed} unconfirmed)" if audit.unconfirmed else ""
+    said = f"{counted(len(findings), 'finding')}{weak}: {listed}"
     accepted = f" beside {len(audit.accepted)} accepted" if audit.accepted else ""
     return f"{said if findings else 'nothing found'}{accepted}"
 

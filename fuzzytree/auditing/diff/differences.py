@@ -20,7 +20,7 @@ from fuzzytree.auditing.diff.system_differences import draft_system_changes
 from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, limited
-from fuzzytree.auditing.findings.audit import TWICE_S, decided_twice, source_of
+from fuzzytree.auditing.findings.audit import decided_twice, source_of
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
@@ -175,7 +175,7 @@ def difference(
         tuple(sorted(changes, key=lambda change: order[change.grade])),
         tuple(answers),
     )
-    return _proved_twice(result, both, Clock(min(TWICE_S, settings.budget_s / 4)))
+    return _proved_twice(result, both, Clock(settings.budget_s / 4))
 
 
 def _proved_twice(

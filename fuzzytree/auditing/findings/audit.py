@@ -55,9 +55,6 @@ from fuzzytree.model import (
 
 FamilyFunction = Callable[[Subject], Iterator[AuditAnswer]]
 
-TWICE_S = 3.0
-"""The most seconds in which proofs are decided again."""
-
 _OF_A_ROW = "FT204"
 _LATE = "FTD03"
 _TOO_LARGE = "it needs more memory than there is"
@@ -110,7 +107,6 @@ def audit(
         subject = Subject(**facts, settings=settings, clock=clock, rows=rows)
         _run_all([*_tasks(wanted, row)], subject, clock, progress)
     answers = tuple(_located(progress.answers, wanted, viewed, material, repeat))
-    ids = {one.id for one in answers if one.is_finding}
     result = Audit(
         version=version(),
         model=model.name,
@@ -126,17 +122,18 @@ def audit(
         unasked=tuple(_unasked(viewed.policy, wanted, progress)),
         limits=LIMITS,
         is_complete=not progress.cut,
-        accepted=tuple(sorted(ids.intersection(selection.accepted))),
         results=tuple(one.result for one in material.results),
         numbers=() if _is_plain(viewed.numbers) else viewed.numbers,
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
-    left = min(TWICE_S, settings.budget_s / 4)
-    late = clock if clock and clock.is_over else Clock(left)
+    late = clock if clock and clock.is_over else Clock(settings.budget_s / 4)
     is_class = viewed.policy.decision == "strongest" and model is viewed.system
     whole = viewed.rules if is_class and viewed.rules is not None else model
     result = _proved_twice(result, whole, late)
+    ids = {one.id for one in result.findings}
+    accepted = tuple(sorted(ids.intersection(selection.accepted)))
+    result = msgspec.structs.replace(result, accepted=accepted)
     return msgspec.structs.replace(result, digest=digest_of(result))
 
 
@@ -163,7 +160,8 @@ def decided_twice(
 ) -> tuple[AuditAnswer, ...]:
     """Return answers of which those that are not decided again are COMPUTED.
 
-    What the re-checker decides otherwise is reported as FT901.
+    Such a finding is no error, but a warning. What the re-checker decides otherwise is
+    left out, and FT901 stands in its place.
 
     Args:
         answers: The answers.
@@ -175,13 +173,17 @@ def decided_twice(
     except (LossError, CannotRunError):
         every = enumerate(answers)
         places = {n: "" for n, one in every if isinstance(one.state, Proved)}
-    result, refuted = [*answers], list[AuditAnswer]()
+    result = [*answers]
     for place, why in places.items():
         one = result[place]
         assert isinstance(one.state, Proved)
-        result[place] = msgspec.structs.replace(one, state=Computed(one.state.how))
-        refuted += [_refuted(one, why)] if why else []
-    return tuple(sorted((*result, *refuted), key=lambda one: one.code))
+        result[place] = _refuted(one, why) if why else _unconfirmed(one, one.state.how)
+    return tuple(sorted(result, key=lambda one: one.code))
+
+
+def _unconfirmed(answer: AuditAnswer, how: str) -> AuditAnswer:
+    severity = "warning" if answer.severity == "error" else answer.severity
+    return msgspec.structs.replace(answer, state=Computed(how), severity=severity)
 
 
 def _refuted(answer: AuditAnswer, why: str) -> AuditAnswer:

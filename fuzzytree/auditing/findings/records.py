@@ -12,6 +12,7 @@ import msgspec
 
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Span, State
+from fuzzytree.auditing.recheck.checks import is_unconfirmed
 from fuzzytree.model import Value, summary
 
 FORMAT: Final = "fuzzytree-audit/1"
@@ -237,6 +238,11 @@ class Audit(Value, frozen=True):
         """The findings that no baseline accepts."""
         known = set(self.accepted)
         return tuple(answer for answer in self.findings if answer.id not in known)
+
+    @property
+    def unconfirmed(self) -> int:
+        """How many findings could be PROVED, and were not decided again."""
+        return sum(map(is_unconfirmed, self.open_findings))
 
     def __repr__(self) -> str:
         """Show how many answers there are, and how many of them are findings."""

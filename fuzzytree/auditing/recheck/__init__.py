@@ -30,6 +30,7 @@ from fuzzytree.auditing.recheck.checks import (
 )
 from fuzzytree.auditing.recheck.models import Model
 from fuzzytree.auditing.recheck.outcomes import (
+    STEPS_IN_ALL,
     CannotRunError,
     DoesNotHoldError,
     Limit,
@@ -100,7 +101,8 @@ def undecided(
     Raises:
         CannotRunError: If the model cannot be read.
     """
-    _, _, case = _read(audit, model, ("the audit", "model.yaml"), Limit(is_late))
+    names, limit = ("the audit", "model.yaml"), Limit(STEPS_IN_ALL, is_late)
+    _, _, case = _read(audit, model, names, limit)
     result: dict[int, str] = {}
     for place, answer in enumerate(case.answers):
         if isinstance(answer.state, Proved):

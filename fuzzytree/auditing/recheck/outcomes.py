@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
@@ -31,28 +32,36 @@ def require(is_so: bool, otherwise: str) -> None:
 
 
 MOST_STEPS = 2_000_000
+STEPS_IN_ALL = 2 * MOST_STEPS
+"""For an answer, and for all answers of an audit that is not yet done."""
 
 
 class Limit:
-    """How much work an answer may take: so many steps, and some time.
+    """How much work an answer may take, and all of them.
 
-    `is_late`: Whether the time is over.
+    Attributes:
+        left: The steps that are left for an answer.
+        whole: Those left for all answers.
+        is_late: Whether nothing more shall be begun.
     """
 
-    def __init__(self, is_late: Callable[[], bool] = lambda: False) -> None:
-        self.is_late, self.left = is_late, MOST_STEPS
+    def __init__(
+        self, whole: float = math.inf, is_late: Callable[[], bool] = lambda: False
+    ) -> None:
+        self.left, self.whole, self.is_late = MOST_STEPS, whole, is_late
 
     def spend(self, steps: int) -> None:
         """Count some steps.
 
         Raises:
-            UndecidedError: If there are too many, or the time is over.
+            UndecidedError: If there are too many, or nothing more shall be begun.
         """
         self.left -= steps
+        self.whole -= steps
         if self.left < 0:
             raise UndecidedError(f"more than {MOST_STEPS:,} steps")
-        if self.is_late():
-            raise UndecidedError("the time is over")
+        if self.whole < 0 or self.is_late():
+            raise UndecidedError("the budget is spent")
 
 
 class Report:

@@ -20,6 +20,7 @@ from fuzzytree.auditing.recheck.checks import check_message, check_sample, check
 from fuzzytree.auditing.recheck.curves import bounds, is_straight, knots
 from fuzzytree.auditing.recheck.models import ONE, Curve, Facts, Model, Variable
 from fuzzytree.auditing.recheck.outcomes import (
+    STEPS_IN_ALL,
     Limit,
     Report,
     UndecidedError,
@@ -85,7 +86,7 @@ def undecided_difference(
         CannotRunError: If a model cannot be read.
     """
     names = "the comparison", "old.yaml", "new.yaml"
-    facts, both = _read(diff, (old, new), names, Limit(is_late))
+    facts, both = _read(diff, (old, new), names, Limit(STEPS_IN_ALL, is_late))
     result: dict[int, str] = {}
     for place, answer in enumerate(facts.answers):
         report = Report()

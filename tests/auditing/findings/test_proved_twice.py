@@ -16,14 +16,15 @@ from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.recheck import recheck
 from fuzzytree.auditing.recheck.case import Case
 from fuzzytree.auditing.recheck.deciding import PROOFS
-from fuzzytree.auditing.recheck.outcomes import DoesNotHoldError
+from fuzzytree.auditing.recheck.outcomes import DoesNotHoldError, UndecidedError
 from fuzzytree.auditing.recheck.records import Answer
 from fuzzytree.exporters import yaml
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Conjunction
+from fuzzytree.report import audit_verdict
 from fuzzytree.testing import random_system
 from tests.auditing.diff.test_system_numbers import tipper
-from tests.auditing.engine.bases import Kind, random_base
+from tests.auditing.engine.bases import Kind, random_base, with_hidden_rule
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 WITHOUT_RUNTIMES = AuditSelection(skip=["FT6"])
@@ -76,7 +77,9 @@ def test_all_that_is_proved_of_a_system_is_decided_again(seed: int) -> None:
     check(random_system(seed, formulas="none"))
 
 
-def test_what_is_decided_otherwise_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_decided_otherwise_is_left_out_and_an_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def refuted(case: Case, answer: Answer) -> None:
         raise DoesNotHoldError("it is otherwise")
 
@@ -85,8 +88,40 @@ def test_what_is_decided_otherwise_is_an_error(monkeypatch: pytest.MonkeyPatch) 
     (one,) = (a for a in result.answers if a.code == "FT901")
     sentence = "terms and variables: the proof of FT404 is refuted: it is otherwise"
     assert (one.sentence, one.severity, one.is_finding) == (sentence, "error", True)
-    (other,) = (a for a in result.answers if a.message == "FT404.used")
-    assert isinstance(other.state, Computed)
+    assert "FT404.used" not in {a.message for a in result.answers}
+
+
+def test_a_dead_rule_that_is_not_confirmed_is_a_warning_and_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def late(case: Case, answer: Answer) -> None:
+        raise UndecidedError("it takes too long")
+
+    model = with_hidden_rule(random_base(1, 2, 2, "minimum", "points"))
+    content = yaml.write(model).content
+    monkeypatch.setitem(PROOFS, "FT101.never-wins", late)
+    result = audited(model, content)
+    (dead,) = (a for a in result.findings if a.message == "FT101.never-wins")
+    assert isinstance(dead.state, Computed)
+    assert (dead.severity, result.unconfirmed) == ("warning", 1)
+    assert audit_verdict(result).startswith(
+        f"{len(result.findings)} findings (1 unconf"
+    )
+    encoded = msgspec.json.encode(result)
+    assert recheck(encoded, content, ("audit", "model")).wrong == []
+
+
+def test_how_much_is_decided_again_is_a_number_of_steps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = random_base(1, 4, 2, "minimum", "points")
+    spent = []
+    for steps in (10**9, 20_000, 20_000):
+        monkeypatch.setattr("fuzzytree.auditing.recheck.STEPS_IN_ALL", steps)
+        proofs = [a for a in audited(model).answers if isinstance(a.state, Proved)]
+        spent.append([a.id for a in proofs])
+    assert len(spent[0]) > len(spent[1]) > 0
+    assert spent[1] == spent[2]
 
 
 @pytest.mark.one_in(4)
