@@ -25,7 +25,7 @@ from fuzzytree.formats import (
     DEFAULTS,
     DIALECT,
     DIALECTS,
-    FIS_FAR,
+    FAR,
     FIS_METHODS,
     FIS_SNORMS,
     FIS_TNORMS,
@@ -381,7 +381,7 @@ def _range(
             numbers += result[::2] if kind == "discretemf" else result
     near = [number for number in numbers if abs(number) < 1e290]
     if isinstance(one, Variable):
-        near = [-FIS_FAR, FIS_FAR]
+        near = [-FAR, FAR]
     low = one.low if one.low is not None else min(near, default=0.0)
     high = one.high if one.high is not None else max(near, default=1.0)
     if low >= high:

@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterable
 
 from fuzzytree.formats import (
-    FIS_FAR,
+    FAR,
     FIS_KINDS,
     PRIVATE,
     Dialect,
     curve_of,
     fuzzylite_text_of,
     in_words,
+    is_plain,
 )
 from fuzzytree.model import (
     LR,
@@ -111,7 +112,7 @@ def _formed(curve: SystemCurve, dialect: Dialect) -> FisTerm | None:
             return None
         case Bell(slope=slope) if dialect == "octave" and slope != int(slope):
             return None
-        case SigmoidDifference() if dialect == "octave":
+        case SigmoidDifference() if dialect == "octave" and not is_plain(curve):
             return None
         case _:
             is_known = dialect == "fuzzylite"
@@ -139,10 +140,10 @@ def _corners(curve: Trapezoid | Singleton | Binary) -> _Corners | None:
             return _corners(Trapezoid(None, start, start, start))
         case Trapezoid(a=a, b=b, c=c, d=d):
             inner = [corner for corner in (a, b, c, d) if corner is not None]
-            if max(map(abs, inner)) >= FIS_FAR / 2:
+            if max(map(abs, inner)) >= FAR / 2:
                 return None
-            left = (-2 * FIS_FAR, -FIS_FAR) if a is None else (a, b)
-            right = (FIS_FAR, 2 * FIS_FAR) if d is None else (c, d)
+            left = (-2 * FAR, -FAR) if a is None else (a, b)
+            right = (FAR, 2 * FAR) if d is None else (c, d)
             if left[0] == left[1]:
                 left = (math.nextafter(b, -math.inf), b)
             if right[0] == right[1]:
@@ -153,11 +154,11 @@ def _corners(curve: Trapezoid | Singleton | Binary) -> _Corners | None:
 def _corners_of(points: Points) -> _Corners | None:
     """Return corners that are read back as these very points, if there are any."""
     degrees, values = points.degrees, points.values
-    if 1.0 not in degrees or max(map(abs, values)) >= FIS_FAR / 2:
+    if 1.0 not in degrees or max(map(abs, values)) >= FAR / 2:
         return None
     first = degrees.index(1.0)
     last = len(degrees) - 1 - degrees[::-1].index(1.0)
-    left, right = (-2 * FIS_FAR, -FIS_FAR), (FIS_FAR, 2 * FIS_FAR)
+    left, right = (-2 * FAR, -FAR), (FAR, 2 * FAR)
     if first > 0:
         a, b = values[first - 1], values[first]
         left = (a, b if a < b else math.nextafter(b, math.inf))

@@ -8,7 +8,6 @@ from .fcl.fcl_dialects import PAIRS as PAIRS
 from .fcl.fcl_reader import FACTS as FACTS
 from .fcl.fcl_reader import read_fcl as read_fcl
 from .fcl.fcl_rules import ALWAYS as ALWAYS
-from .fcl.fcl_terms import is_plain as is_plain
 from .fcl.fcl_terms import shape_in_fcl as shape_in_fcl
 from .fis.fis_reader import DEFAULTS as DEFAULTS
 from .fis.fis_reader import DIALECT as DIALECT
@@ -17,7 +16,6 @@ from .fis.fis_reader import middle as middle
 from .fis.fis_reader import read_fis as read_fis
 from .fis.fis_words import CONCLUDING_HEDGES as CONCLUDING_HEDGES
 from .fis.fis_words import DIALECTS as DIALECTS
-from .fis.fis_words import FIS_FAR as FIS_FAR
 from .fis.fis_words import FIS_HEDGES as FIS_HEDGES
 from .fis.fis_words import FIS_KINDS as FIS_KINDS
 from .fis.fis_words import FIS_METHODS as FIS_METHODS
@@ -49,6 +47,8 @@ from .formulas import FormulaError as FormulaError
 from .formulas import fuzzylite_text_of as fuzzylite_text_of
 from .formulas import parse as parse
 from .formulas import text_of as text_of
+from .shapes import FAR as FAR
+from .shapes import is_plain as is_plain
 from .simpful import from_simpful as from_simpful
 from .skfuzzy import from_skfuzzy as from_skfuzzy
 from .sklearn import from_sklearn as from_sklearn

@@ -8,10 +8,23 @@ their format.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Final, Literal, TypeVar
 
 import msgspec
 
+from fuzzytree.formats.shapes import (
+    Engine,
+    Maker,
+    binary,
+    difference_of,
+    line,
+    ramp,
+    rectangle,
+    s_shape,
+    trapezoid,
+    triangle,
+)
 from fuzzytree.model import (
     Arc,
     Bell,
@@ -145,6 +158,32 @@ Of a number between bars the size counts, and not the sign.
 """
 
 
+SHAPE_WORDS: Final[Mapping[Maker, Words]] = {
+    triangle: Words(
+        "TRIAN a b c", "Triangle a b c", "trimf a b c", "triangularShape a b c"
+    ),
+    trapezoid: Words(
+        "TRAPE a b c d", "Trapezoid a b c d", "trapmf a b c d", "trapezoidShape a b c d"
+    ),
+    partial(line, falls=True): Words(fis="linzmf a b", fml="leftLinearShape a b"),
+    line: Words(fis="linsmf a b", fml="rightLinearShape a b"),
+    s_shape: Words(fll="SShape start end", fis="smf start end", fml="sShape a b"),
+    partial(s_shape, falls=True): Words(
+        fll="ZShape start end", fis="zmf start end", fml="zShape a b"
+    ),
+    ramp: Words(fll="Ramp start end", fuzzylite_fis="rampmf start end"),
+    rectangle: Words(
+        fll="Rectangle start end",
+        fml="rectangularShape a b",
+        fuzzylite_fis="rectmf start end",
+    ),
+    binary: Words(
+        fll="Binary start direction", fuzzylite_fis="binarymf start direction"
+    ),
+}
+"""The words for membership functions whose numbers mean another one in some order."""
+
+
 def meanings(table: Mapping[Meaning, Words], *columns: Column) -> dict[str, Meaning]:
     """Return what each word of a format means.
 
@@ -177,12 +216,12 @@ class FunctionWord(msgspec.Struct, frozen=True):
 
     Attributes:
         numbers: What its numbers are, in the order of the file.
-        make: What they make; it raises ValueError for wrong ones.
+        make: What they make in an engine; it raises ValueError for wrong ones.
         numbers_of: The numbers of a function, None of one that the word cannot say.
     """
 
     numbers: str
-    make: Callable[[Sequence[float]], Curve]
+    make: Maker
     numbers_of: Callable[[Curve], Sequence[float] | None] = lambda _: None
 
     @property
@@ -209,18 +248,22 @@ def in_words(curve: Curve, words: FunctionWords) -> tuple[str, list[float]] | No
 
 
 def function_words(*columns: Column) -> dict[str, FunctionWord]:
-    """Return the words of a format for functions whose numbers it writes as they are.
+    """Return the words of a format for membership functions.
 
     Example:
-        >>> function_words("fll")["Gaussian"].make([5.0, -2.0])
+        >>> function_words("fll")["Gaussian"].make([5.0, -2.0], "fuzzylite")
         Gaussian(mean=5.0, deviation=2.0)
     """
-    return dict(
-        _spelled(kind, text)
-        for column in columns
-        for kind, words in FUNCTION_WORDS.items()
-        if (text := getattr(words, column))
-    )
+    words: dict[str, FunctionWord] = {}
+    for column in columns:
+        for make, spellings in SHAPE_WORDS.items():
+            name, _, numbers = getattr(spellings, column).partition(" ")
+            if name:
+                words[name] = FunctionWord(numbers, make)
+        for kind, spellings in FUNCTION_WORDS.items():
+            if text := getattr(spellings, column):
+                words |= [_spelled(kind, text)]
+    return words
 
 
 def _spelled(kind: type[SystemCurve], text: str) -> tuple[str, FunctionWord]:
@@ -232,11 +275,11 @@ def _spelled(kind: type[SystemCurve], text: str) -> tuple[str, FunctionWord]:
         places = [k for k, field in enumerate(fields) if field == one]
         order.append(places[plain[:place].count(one)])
 
-    def make(numbers: Sequence[float]) -> Curve:
+    def make(numbers: Sequence[float], engine: Engine) -> Curve:
         values = [0.0] * len(order)
         for place, number, one in zip(order, numbers, marked, strict=True):
             values[place] = abs(number) if one.startswith("|") else number
-        return _built(kind, values)
+        return difference_of(_built(kind, values), engine)
 
     def numbers_of(curve: Curve) -> Sequence[float] | None:
         if type(curve) is not kind:

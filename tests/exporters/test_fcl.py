@@ -279,9 +279,9 @@ def test_low_ends_of_pieces_are_jfuzzylogics_and_stay_so() -> None:
         write(system, dialect="jfuzzylogic")
     assert str(caught.value) == (
         "cannot write fan as fcl (jfuzzylogic) without loss:\n"
-        "  output 'fan': its curve is sampled at 1000 values (middle), and FCL does not "
-        "say so; jfuzzylogic takes 1000 (low ends), each half a piece (0.0025) lower\n"
-        "  pass allow_loss=True to write it as stated"
+        "  output 'fan': its curve is sampled at 1000 values (middle), and FCL does "
+        "not say so; jfuzzylogic takes 1000 (low ends), each half a piece (0.0025) "
+        "lower\n  pass allow_loss=True to write it as stated"
     )
 
 

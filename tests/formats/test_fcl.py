@@ -32,7 +32,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.model.contracts import Reading
 from fuzzytree.model.rulebase import Points
-from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.inference import curve_degree, infer
 from tests.work import at_most
 
 STANDARD = """\
@@ -407,10 +407,12 @@ def test_functions_of_jfuzzylogic_are_written_in_capitals_and_log_is_to_ten() ->
     )
 
 
-def test_a_difference_of_sigmoids_that_would_be_cut_off_is_a_loss() -> None:
-    text = STANDARD.replace("(2, 0) (6, 1)", "DSIGM 2 5 2 1")
-    (loss,) = _read(text).losses
-    assert loss.where == "term 'full' of 'load'"
+def test_a_difference_of_sigmoids_is_cut_off_at_0_as_in_jfuzzylogic() -> None:
+    reading = _read(STANDARD.replace("(2, 0) (6, 1)", "DSIGM 2 5 2 1"))
+    assert reading.losses == ()
+    assert isinstance(reading.model, FuzzySystem)
+    (term,) = reading.model.variables[1].terms
+    assert curve_degree(term.function, 3.0) == 0.0
 
 
 def test_a_missing_operator_comes_with_its_partner() -> None:

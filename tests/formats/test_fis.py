@@ -8,7 +8,8 @@ import pytest
 
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.fis.fis_reader import read_fis
-from fuzzytree.formats.fis.fis_words import FIS_FAR, FIS_KINDS, Dialect, curve_of
+from fuzzytree.formats.fis.fis_words import FIS_KINDS, Dialect, curve_of
+from fuzzytree.formats.shapes import FAR
 from fuzzytree.model import (
     And,
     Bell,
@@ -18,6 +19,7 @@ from fuzzytree.model import (
     Cosine,
     Curve,
     Defuzzifier,
+    Formula,
     FuzzySystem,
     Gaussian,
     Linear,
@@ -34,7 +36,7 @@ from fuzzytree.model import (
     Trapezoid,
     TwoGaussians,
 )
-from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.inference import curve_degree, infer
 from fuzzytree.semantics.reference import Status
 from tests.work import at_most
 
@@ -136,8 +138,8 @@ def test_sections_and_terms_may_stand_in_any_order() -> None:
     [
         ("trimf", (1, 2, 4), Trapezoid(1.0, 2.0, 2.0, 4.0)),
         ("trapmf", (1, 1, 2, 4), Trapezoid(1.0, 1.0, 2.0, 4.0)),
-        ("trapmf", (-2 * FIS_FAR, -FIS_FAR, 2, 4), Trapezoid(None, 2.0, 2.0, 4.0)),
-        ("trapmf", (1, 2, FIS_FAR, 2 * FIS_FAR), Trapezoid(1.0, 2.0, 2.0, None)),
+        ("trapmf", (-2 * FAR, -FAR, 2, 4), Trapezoid(None, 2.0, 2.0, 4.0)),
+        ("trapmf", (1, 2, FAR, 2 * FAR), Trapezoid(1.0, 2.0, 2.0, None)),
         ("trapmf", (-float("inf"), -float("inf"), 2, 4), Trapezoid(None, 2, 2, 4)),
         ("linzmf", (1, 2), Points((1.0, 2.0), (1.0, 0.0))),
         ("linsmf", (1, 2), Points((1.0, 2.0), (0.0, 1.0))),
@@ -166,6 +168,70 @@ def test_every_kind_of_curve(
 ) -> None:
     assert curve_of(kind, [*map(float, numbers)]) == curve
     assert kind in FIS_KINDS or kind == "discretemf"
+
+
+@pytest.mark.parametrize(
+    ("dialect", "text", "curve"),
+    [
+        ("matlab", "smf 3 1", Binary(2.0)),
+        ("matlab", "zmf 3 1", Binary(2.0, is_above=False)),
+        ("matlab", "linsmf 2 2", Binary(2.0)),
+        ("matlab", "linzmf 2 2", Binary(math.nextafter(2.0, 0.0), is_above=False)),
+        ("octave", "smf 3 1", "Octave takes no curve from 3.0 to 1.0"),
+        ("matlab", "linsmf 3 1", "the line ends at 1.0, before its start 3.0"),
+        ("fuzzylite", "smf 3 1", Points((3.0, 3.0), (0.0, 1.0))),
+        ("fuzzylite", "zmf 3 1", Points((3.0, 3.0), (1.0, 0.0))),
+        ("fuzzylite", "rectmf 3 1", Trapezoid(1.0, 1.0, 3.0, 3.0)),
+        ("octave", "dsigmf 1 2 1 4", SigmoidDifference(Sigmoid(2, 1), Sigmoid(4, 1))),
+    ],
+)
+def test_numbers_out_of_order_mean_what_the_engine_makes_of_them(
+    dialect: Dialect, text: str, curve: Curve | str
+) -> None:
+    kind, *numbers = text.split()
+    assert curve_of(kind, [*map(float, numbers)], dialect) == curve
+
+
+def test_octave_cuts_a_difference_of_sigmoids_off_at_0() -> None:
+    numbers = [2.0, 5.0, 2.0, 1.0]
+    octave, matlab = (curve_of("dsigmf", numbers, d) for d in ("octave", "matlab"))
+    assert isinstance(octave, Formula)
+    assert isinstance(matlab, SigmoidDifference)
+    assert curve_degree(octave, 3.0) == 0.0
+    assert curve_degree(matlab, 3.0) == pytest.approx(0.964, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("'zmf',[3 6]", "'zmf',[3 6 0.5]"),
+        ("'trapmf',[-1 0 2 4]", "'trapmf',[-1 0 2 4 0.5]"),
+        ("'trapmf',[-1 0 2 4]", "'discretemf',[0 1 2 0 0.5]"),
+    ],
+)
+def test_one_number_more_is_a_height_of_fuzzylite_and_refused_elsewhere(
+    old: str, new: str
+) -> None:
+    text = SUGENO.replace("a comment", "from fuzzylite").replace(old, new)
+    inputs = read(text).variables
+    heights = [term.height for one in inputs for term in one.terms]
+    assert sorted(heights) == [0.5, 1.0, 1.0]
+    if "discretemf" in new:  # only fuzzylite has it
+        return
+    with pytest.raises(ReadError) as caught:
+        read(text, "matlab")
+    assert str(caught.value).endswith(
+        "; one more is a height in fuzzylite's files (--from fis:fuzzylite)"
+    )
+
+
+def test_a_height_above_1_is_refused_with_its_place() -> None:
+    text = SUGENO.replace("a comment", "from fuzzylite").replace("[3 6]", "[3 6 7]")
+    with pytest.raises(ReadError) as caught:
+        read(text)
+    assert str(caught.value) == (
+        "tip.fis:26:5: term 'slow' of 'service': the height must lie in (0, 1], not 7.0"
+    )
 
 
 HEDGED = SUGENO.replace("1 1, 1 (1) : 1", "1.30 -1.20, 1.30 (1) : 1")

@@ -344,8 +344,8 @@ def test_all_mistakes_are_reported_at_once_with_their_places_and_nearest_names()
         "range, lock-range, term, Engine, InputVariable, OutputVariable, RuleBlock "
         "(did you mean 'range'?)",
         "m.fll:6:13: no term 'Triangel'; there is Constant, Discrete, Function, "
-        "Linear, Arc, Bell, Concave, Cosine, Gaussian, PiShape, Sigmoid, "
-        "SigmoidDifference, ... (did you mean 'Triangle'?)",
+        "Linear, Triangle, Trapezoid, SShape, ZShape, Ramp, Rectangle, Binary, "
+        "Arc, ... (did you mean 'Triangle'?)",
         "m.fll:7:13: Triangle takes 3 numbers, or 4 with the height, not 2",
         "m.fll:8:25: 'one' where a number must stand",
         "m.fll:8:31: 'two' where a number must stand",

@@ -125,6 +125,11 @@ def test_a_sugeno_system_is_read_whole() -> None:
         ("rectangularShape 1 2", Trapezoid(1.0, 1.0, 2.0, 2.0)),
         ("zShape 1 2", SCurve(2.0, 1.0)),
         ("sShape 1 2", SCurve(1.0, 2.0)),
+        ("zShape 2 1", Points((2.0, 2.0), (1.0, 0.0))),
+        ("zShape 2 2", Points((2.0, 2.0), (1.0, 0.0))),
+        ("sShape 2 1", Points((2.0, 2.0), (0.0, 1.0))),
+        ("rightLinearShape 2 1", Points((2.0, 2.0), (0.0, 1.0))),
+        ("leftLinearShape 2 1", Points((2.0, 2.0), (1.0, 0.0))),
     ],
 )
 def test_every_shape(shape: str, curve: Curve) -> None:

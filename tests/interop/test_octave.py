@@ -178,6 +178,33 @@ def test_random_systems_answer_alike_in_fuzzylite(
     assert close <= 0.05 * compared
 
 
+def test_a_difference_of_sigmoids_is_octaves(program: Need, tmp_path: Path) -> None:
+    kinds = ["dsigmf 2 5 2 1", "dsigmf 1 1 3 3", "dsigmf 1 1 1 3"]
+    head = "[System]\nName='t'\nType='sugeno'\nVersion=2.0\nNumInputs=1\n"
+    lines = [f"{head}NumOutputs={len(kinds)}", f"NumRules={2 * len(kinds)}"]
+    lines += ["AndMethod='min'", "OrMethod='max'", "ImpMethod='min'"]
+    lines += ["AggMethod='sum'", "DefuzzMethod='wtaver'", "", "[Input1]", "Name='heat'"]
+    lines += ["Range=[-9 9]", f"NumMFs={len(kinds)}"]
+    for k, kind in enumerate(kinds, 1):
+        name, numbers = kind.split(" ", 1)
+        lines.append(f"MF{k}='t{k}':'{name}',[{numbers}]")
+    rules: list[str] = []
+    for k in range(1, len(kinds) + 1):
+        # A term's degree d answers d from 1 where it holds and 0 where it does not.
+        lines += ["", f"[Output{k}]", f"Name='o{k}'", "Range=[0 1]", "NumMFs=2"]
+        lines += ["MF1='no':'constant',[0]", "MF2='yes':'constant',[1]"]
+        for sign, term in ((k, 2), (-k, 1)):
+            then = " ".join(str(term if k == j + 1 else 0) for j in range(len(kinds)))
+            rules.append(f"{sign}, {then} (1) : 1")
+    content = "\n".join([*lines, "", "[Rules]", *rules, ""]).encode()
+    rows = [[x / 4.0] for x in range(-32, 33)]
+    result = answers(program("octave"), tmp_path, {"t": (content, rows)})["t"]
+    system = read_fis(content, "t.fis", dialect="octave").model
+    assert isinstance(system, FuzzySystem)
+    own = [infer(system, {"heat": x}).outputs for (x,) in rows]
+    assert largest_difference(own, result.rows) <= EXACT
+
+
 @pytest.mark.heavy
 def test_random_systems_answer_alike_in_octave(program: Need, tmp_path: Path) -> None:
     octave = program("octave")

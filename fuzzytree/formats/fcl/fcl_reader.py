@@ -314,14 +314,10 @@ def _terms(
             continue
         earlier.add(label)
         try:
-            result = fcl_terms.read(text, where, known.dialect)
+            results.append(fcl_terms.read(text, where, known.dialect))
         except PartError as error:
             known.notes.mistakes.extend(error.mistakes)
             results.append(FllTerm(Term(label, Singleton(0.0)), "Constant"))
-            continue
-        if result.loss:
-            known.notes.loss(f"term {label!r} of {name!r}", result.loss)
-        results.append(result.term)
     return results
 
 

@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-import msgspec
 from lark import Token
 from msgspec.structs import astuple
 
 from fuzzytree.formats.fcl.fcl_dialects import Dialect
 from fuzzytree.formats.fcl.fcl_syntax import TermStatement, place
 from fuzzytree.formats.fll.fll_terms import CLASSES, FllTerm, TermScope, read_term
+from fuzzytree.formats.shapes import Engine, is_plain
 from fuzzytree.formats.text_files import PartError, Word, number_of
 from fuzzytree.formats.words import (
     FunctionWord,
@@ -33,14 +33,7 @@ from fuzzytree.model import (
 _FORMULA = "FUNCTION"
 
 
-class FclTerm(msgspec.Struct, frozen=True):
-    """A term that was read, and what its curve cannot hold of the file."""
-
-    term: FllTerm
-    loss: str = ""
-
-
-def read(text: TermStatement, where: TermScope, dialect: Dialect) -> FclTerm:
+def read(text: TermStatement, where: TermScope, dialect: Dialect) -> FllTerm:
     """Return the term of a statement.
 
     Raises:
@@ -51,19 +44,19 @@ def read(text: TermStatement, where: TermScope, dialect: Dialect) -> FclTerm:
     if text.kind == "number":
         kind = Word("Constant", *place(first))
         if dialect == "fuzzylite" or where.is_weighted:
-            return FclTerm(read_term(name, kind, _words(text.tokens), where))
-        return FclTerm(_checked(first, name, curves.Singleton(_number(first)), where))
+            return read_term(name, kind, _words(text.tokens), where)
+        return _checked(first, name, curves.Singleton(_number(first)), where)
     if text.kind == "points":
         numbers = [_number(one) for one in text.tokens]
         points = Points(tuple(numbers[::2]), tuple(numbers[1::2]))
-        return FclTerm(_checked(first, name, points, where))
+        return _checked(first, name, points, where)
     if first.upper() == _FORMULA:
         kind = Word("Function", *place(first))
         words = _formula_words(text, dialect)
         formula = ""
         for word in words:
             formula = formula.ljust(word.column - words[0].column) + word.text
-        return FclTerm(read_term(name, kind, words, where, formula))
+        return read_term(name, kind, words, where, formula)
     if str(first) not in CLASSES and first.upper() in FCL_SHAPES:
         return _shape(text, where)
     exact = next((one for one in CLASSES if one.upper() == first.upper()), "")
@@ -74,7 +67,7 @@ def read(text: TermStatement, where: TermScope, dialect: Dialect) -> FclTerm:
     kind = Word(exact, *place(first))
     plain = [one for one in text.tokens[1:] if one.type not in ("LPAR", "RPAR")]
     rest = [one for one in plain if one.type != "COMMA"]
-    return FclTerm(read_term(name, kind, _words(rest), where))
+    return read_term(name, kind, _words(rest), where)
 
 
 def _words(tokens: Sequence[Token]) -> list[Word]:
@@ -121,7 +114,7 @@ def _formula_words(text: TermStatement, dialect: Dialect) -> list[Word]:
     return results
 
 
-def _shape(text: TermStatement, where: TermScope) -> FclTerm:
+def _shape(text: TermStatement, where: TermScope) -> FllTerm:
     first, *rest = text.tokens
     word = FCL_SHAPES[first.upper()]
     numbers = [_number(one) for one in rest]
@@ -129,28 +122,22 @@ def _shape(text: TermStatement, where: TermScope) -> FclTerm:
         sentence = f"{first} takes {word.arity} numbers, not {len(numbers)}"
         raise PartError((*place(first), sentence))
     try:
-        curve = word.make(numbers)
+        curve = word.make(numbers, "jfuzzylogic")
     except ValueError as error:
         raise PartError((*place(first), str(error))) from error
-    loss = ""
-    if isinstance(curve, curves.SigmoidDifference) and not is_plain(curve):
-        loss = "where the first sigmoid is below the second one, the difference "
-        loss += "counts and not 0, as jFuzzyLogic has it"
-    return FclTerm(_checked(first, str(text.name), curve, where), loss)
+    return _checked(first, str(text.name), curve, where)
 
 
-def _two_gaussians(n: Sequence[float]) -> Curve:
+def _two_gaussians(n: Sequence[float], engine: Engine) -> Curve:
     if n[0] > n[2]:
         raise ValueError(f"the first mean {n[0]!r} must not lie above {n[2]!r}")
     return curves.TwoGaussians(*n)
 
 
 FCL_SHAPES: Final[FunctionWords] = {
-    "TRIAN": FunctionWord("a b c", lambda n: curves.Trapezoid(n[0], n[1], n[1], n[2])),
-    "TRAPE": FunctionWord("a b c d", lambda n: curves.Trapezoid(*n)),
     **function_words("fcl"),
     "GAUSS2": FunctionWord("mean deviation mean deviation", _two_gaussians),
-    "COSINE": FunctionWord("half center", lambda n: curves.Cosine(n[1], 2.0 * n[0])),
+    "COSINE": FunctionWord("half center", lambda n, _: curves.Cosine(n[1], 2.0 * n[0])),
 }
 """The curves of jFuzzyLogic."""
 
@@ -170,12 +157,6 @@ def shape_in_fcl(curve: Curve) -> tuple[str, Sequence[float]] | None:
             return None
         case _:
             return in_words(curve, FCL_SHAPES)
-
-
-def is_plain(curve: curves.SigmoidDifference) -> bool:
-    """Return whether the first sigmoid is nowhere below the second one."""
-    one, two = curve.first, curve.second
-    return one.slope == two.slope > 0.0 and one.inflection <= two.inflection
 
 
 def extent(curve: Curve) -> tuple[float, float] | None:

@@ -35,7 +35,6 @@ from fuzzytree.model import (
     Number,
     Or,
     Proposition,
-    SigmoidDifference,
     Singleton,
     SystemOutput,
     SystemRule,
@@ -294,16 +293,18 @@ def _label(
         what = f"term {entry.key} of {about[0]!r} is called {written.name!r}"
         notes.remark(f"{what}; here it is {result!r}")
     curve = _curve(written, entry, about, notes)
-    return Term(result, _WRONG if curve is None else curve)
+    return Term(result, *(curve or (_WRONG,)))
 
 
 def _curve(
     written: FisTerm, entry: FisEntry, about: About, notes: ReaderNotes
-) -> Curve | None:
-    kind = written.kind
+) -> tuple[Curve, float] | None:
+    """Return the curve of a term and its height; None if there is a mistake."""
+    kind, height = written.kind, 1.0
     place = (entry.line, written.column)
     if kind == "function":
-        return _formula(written, place, notes)
+        formula = _formula(written, place, notes)
+        return None if formula is None else (formula, height)
     if kind not in words.FIS_KINDS and kind not in words.OTHER_KINDS:
         known = [*words.FIS_KINDS, *words.OTHER_KINDS]
         what = f"no kind of curve {kind[:40]!r}; {name_choice(kind[:40], known)}"
@@ -316,18 +317,15 @@ def _curve(
     if kind in ("constant", "linear"):
         result = _conclusion_number(kind, numbers, about, notes)
     else:
-        result = words.curve_of(kind, numbers)
+        if about[1] == "fuzzylite" and words.has_height(kind, len(numbers)):
+            height = numbers.pop()
+        result = words.curve_of(kind, numbers, about[1])
         if about[2] is not None and about[2][0] and about[1] != "fuzzylite":
             result = f"a Sugeno system concludes constant and linear, not {kind!r}"
     if isinstance(result, str):
         notes.mistake(place, result)
         return None
-    if isinstance(result, SigmoidDifference) and about[1] != "fuzzylite":
-        notes.remark(
-            f"term {written.name!r} of {about[0]!r}: where the second sigmoid is above "
-            "the first, MATLAB takes their distance, as here, and Octave 0"
-        )
-    return result
+    return result, height
 
 
 def _conclusion_number(

@@ -21,6 +21,7 @@ from fuzzytree.formats.fis import fis_words as words
 from fuzzytree.formats.fis.fis_parts import FisEntry, FisSection, labels_of, rules_of
 from fuzzytree.formats.fis.fis_words import Dialect
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
+from fuzzytree.formats.shapes import FAR
 from fuzzytree.formats.text_files import (
     Positions,
     ReaderNotes,
@@ -298,7 +299,7 @@ def _range(
         what = f"the Range must be two rising numbers, [0 1], not {entry.value[:40]!r}"
         notes.mistake(entry.position, what)
         return None, None
-    low, high = (end if abs(end) < words.FIS_FAR else None for end in ends)
+    low, high = (end if abs(end) < FAR else None for end in ends)
     return low, high
 
 

@@ -14,7 +14,6 @@ from fuzzytree.formats.words import (
     METHOD_WORDS,
     S_NORM_WORDS,
     T_NORM_WORDS,
-    FunctionWord,
     FunctionWords,
     function_words,
     meanings,
@@ -24,14 +23,10 @@ from fuzzytree.model import (
     Curve,
     Hedge,
     Points,
-    curves,
 )
 
 Dialect = Literal["matlab", "octave", "fuzzylite"]
 DIALECTS: Final[tuple[Dialect, ...]] = get_args(Dialect)
-
-FIS_FAR: Final = 1e300
-"""Corners beyond it stand for none: a trapezoid has no way to say `1 up to here`."""
 
 FIS_TNORMS: Final = meanings(T_NORM_WORDS, "fis")
 FIS_SNORMS: Final = meanings(S_NORM_WORDS, "fis")
@@ -66,86 +61,19 @@ CONCLUDING_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
 """The same behind the comma of a Sugeno rule in Octave, which takes the root there."""
 
 
-def trapezoid(a: float, b: float, c: float, d: float) -> curves.Trapezoid:
-    """Return a trapezoid; two corners beyond `FAR` leave a side open.
-
-    A side to the next double is a step: no value lies on it.
-
-    Example:
-        >>> trapezoid(-2e300, -1e300, 3.0, 5.0).a is None
-        True
-    """
-    is_left, is_right = b <= -FIS_FAR, c >= FIS_FAR
-    a = b if a == math.nextafter(b, -math.inf) else a
-    d = c if d == math.nextafter(c, math.inf) else d
-    if is_left and is_right:
-        return curves.Trapezoid(None, 0.0, 0.0, None)
-    if is_left:
-        return curves.Trapezoid(None, c, c, d)
-    if is_right:
-        return curves.Trapezoid(a, b, b, None)
-    return curves.Trapezoid(a, b, c, d)
-
-
-def _ramp(numbers: Sequence[float]) -> Curve:
-    start, end = numbers
-    if start == end:
-        return Points((start,), (0.0,))  # as fuzzylite
-    if start < end:
-        return Points((start, end), (0.0, 1.0))
-    return Points((end, start), (1.0, 0.0))
-
-
-def _rising(numbers: Sequence[float]) -> Curve:
-    start, end = numbers
-    if start < end:
-        return curves.SCurve(start, end)
-    return curves.Binary((start + end) / 2)  # as MATLAB's smf
-
-
-def _falling(numbers: Sequence[float]) -> Curve:
-    start, end = numbers
-    if start < end:
-        return curves.SCurve(end, start)
-    return curves.Binary((start + end) / 2, is_above=False)
-
-
-def _rectangle(numbers: Sequence[float]) -> Curve:
-    start, end = numbers
-    return curves.Trapezoid(start, start, end, end)
-
-
-def _binary(numbers: Sequence[float]) -> Curve:
-    start, direction = numbers
-    return curves.Binary(start, is_above=direction > start)
-
-
-_FUZZYLITE: Final = {
-    **function_words("fuzzylite_fis"),
-    "rampmf": FunctionWord("start end", _ramp),
-    "rectmf": FunctionWord("start end", _rectangle),
-    "binarymf": FunctionWord("start direction", _binary),
-}
-FIS_KINDS: Final[FunctionWords] = {
-    "trimf": FunctionWord("a b c", lambda n: trapezoid(n[0], n[1], n[1], n[2])),
-    "trapmf": FunctionWord("a b c d", lambda n: trapezoid(*n)),
-    "linzmf": FunctionWord("a b", lambda n: _ramp([n[1], n[0]])),
-    "linsmf": FunctionWord("a b", _ramp),
-    "smf": FunctionWord("start end", _rising),
-    "zmf": FunctionWord("start end", _falling),
-    **function_words("fis"),
-    **_FUZZYLITE,
-}
+FIS_KINDS: Final[FunctionWords] = function_words("fis", "fuzzylite_fis")
 """The curves with a fixed number of parameters, by their name in a file."""
 
 OTHER_KINDS: Final = ("discretemf", "constant", "linear", "function")
-PRIVATE: Final = frozenset({*_FUZZYLITE, "discretemf", "function"})
+PRIVATE: Final = frozenset({*function_words("fuzzylite_fis"), "discretemf", "function"})
 """Kinds that MATLAB lacks; all of them are fuzzylite's."""
 
 _MAY_BE_INFINITE: Final = frozenset({"trapmf", "binarymf"})
 
 
-def curve_of(kind: str, numbers: Sequence[float]) -> Curve | str:
+def curve_of(
+    kind: str, numbers: Sequence[float], dialect: Dialect = "matlab"
+) -> Curve | str:
     """Return the curve that a kind of `FIS_KINDS` or `discretemf` makes of its numbers.
 
     Returns:
@@ -164,13 +92,29 @@ def curve_of(kind: str, numbers: Sequence[float]) -> Curve | str:
     word = FIS_KINDS[kind]
     needed = word.arity
     if len(numbers) != needed:
-        return f"a {kind!r} has {needed} numbers ({word.numbers}), not {len(numbers)}"
+        what = f"a {kind!r} has {needed} numbers ({word.numbers}), not {len(numbers)}"
+        if len(numbers) == needed + 1:
+            what += "; one more is a height in fuzzylite's files (--from fis:fuzzylite)"
+        return what
     if any(number != number for number in numbers):
         return "the numbers must be finite"
-    curve = word.make(numbers)
-    for text in curve.mistakes():
-        return text
-    return curve
+    try:
+        curve = word.make(numbers, dialect)
+    except ValueError as error:
+        return str(error)
+    return next(curve.mistakes(), curve)
+
+
+def has_height(kind: str, count: int) -> bool:
+    """Return whether the last of so many numbers is a height, as fuzzylite writes it.
+
+    Example:
+        >>> has_height("trimf", 4), has_height("trimf", 3), has_height("discretemf", 5)
+        (True, False, True)
+    """
+    if kind == "discretemf":
+        return count % 2 == 1
+    return kind in FIS_KINDS and count == FIS_KINDS[kind].arity + 1
 
 
 def _points(numbers: Sequence[float]) -> Curve | str:

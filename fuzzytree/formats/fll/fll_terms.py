@@ -103,7 +103,7 @@ def read_term(
             if len(numbers) > count:
                 height = numbers.pop()
             try:
-                curve = FLL_CLASSES[known].make(numbers)
+                curve = FLL_CLASSES[known].make(numbers, "fuzzylite")
             except ValueError as error:
                 raise _error(kind, str(error)) from error
             if place.is_inverse and known in ("SShape", "ZShape"):
@@ -188,62 +188,11 @@ def _linear(kind: Word, numbers: Sequence[float], place: TermScope) -> Curve:
     return curves.Formula(total)
 
 
-def _binary(numbers: Sequence[float]) -> Curve:
-    start, direction = numbers
-    if start == direction:
-        raise ValueError("the direction of Binary must be above or below its start")
-    return curves.Binary(start, direction > start)
-
-
-def _ramp(numbers: Sequence[float]) -> Curve:
-    start, end = numbers
-    if start == end:
-        raise ValueError("a Ramp must end elsewhere than where it starts")
-    if start < end:
-        return Points((start, end), (0.0, 1.0))
-    return Points((end, start), (1.0, 0.0))
-
-
-def _rectangle(numbers: Sequence[float]) -> Curve:
-    start, end = sorted(numbers)
-    return _trapezoid((start, start, end, end))
-
-
-def _trapezoid(numbers: Sequence[float]) -> Curve:
-    a, b, c, d = numbers
-    low = None if a == -math.inf else a
-    high = None if d == math.inf else d
-    if b == -math.inf and low is None:
-        b = min(c, d) if math.isfinite(min(c, d)) else 0.0
-    if c == math.inf and high is None:
-        c = max(a, b) if math.isfinite(max(a, b)) else 0.0
-    return curves.Trapezoid(low, b, c, high)
-
-
-def _s_shape(numbers: Sequence[float]) -> Curve:
-    start, end = numbers
-    if start < end:
-        return curves.SCurve(start, end)
-    return Points((start, start), (0.0, 1.0))
-
-
-def _z_shape(numbers: Sequence[float]) -> Curve:
-    start, end = numbers
-    if start < end:
-        return curves.SCurve(end, start)
-    return Points((start, start), (1.0, 0.0))
-
-
 FLL_CLASSES: Final[FunctionWords] = {
     **function_words("fll"),
-    "Binary": FunctionWord("start direction", _binary),
-    "Ramp": FunctionWord("start end", _ramp),
-    "Rectangle": FunctionWord("start end", _rectangle),
-    "SemiEllipse": FunctionWord("start end", lambda n: curves.SemiEllipse(*sorted(n))),
-    "SShape": FunctionWord("start end", _s_shape),
-    "Trapezoid": FunctionWord("a b c d", _trapezoid),
-    "Triangle": FunctionWord("a b c", lambda n: _trapezoid((n[0], n[1], n[1], n[2]))),
-    "ZShape": FunctionWord("start end", _z_shape),
+    "SemiEllipse": FunctionWord(
+        "start end", lambda n, _: curves.SemiEllipse(*sorted(n))
+    ),
 }
 """The classes with a fixed number of parameters."""
 CLASSES: Final = ("Constant", "Discrete", "Function", "Linear", *FLL_CLASSES)

@@ -48,28 +48,17 @@ OTHER_MODIFIERS: Final = ("above", "below", "norm", "slightly")
 
 
 SHAPES: Final[FunctionWords] = {
-    "rightLinearShape": FunctionWord("a b", lambda n: Points((n[0], n[1]), (0.0, 1.0))),
-    "leftLinearShape": FunctionWord("a b", lambda n: Points((n[0], n[1]), (1.0, 0.0))),
+    **function_words("fml"),
     "piShape": FunctionWord(
-        "a b", lambda n: PiCurve(n[0], n[1], n[1], n[1] + abs(n[1] - n[0]))
+        "a b", lambda n, _: PiCurve(n[0], n[1], n[1], n[1] + abs(n[1] - n[0]))
     ),
-    "triangularShape": FunctionWord(
-        "a b c", lambda n: Trapezoid(n[0], n[1], n[1], n[2])
-    ),
-    "trapezoidShape": FunctionWord("a b c d", lambda n: Trapezoid(*n)),
     "rightGaussianShape": FunctionWord(
-        "c s", lambda n: TwoGaussians(n[0], abs(n[1]), FML_FAR, 1.0)
+        "c s", lambda n, _: TwoGaussians(n[0], abs(n[1]), FML_FAR, 1.0)
     ),
     "leftGaussianShape": FunctionWord(
-        "c s", lambda n: TwoGaussians(-FML_FAR, 1.0, n[0], abs(n[1]))
+        "c s", lambda n, _: TwoGaussians(-FML_FAR, 1.0, n[0], abs(n[1]))
     ),
-    "singletonShape": FunctionWord("a", lambda n: Singleton(n[0])),
-    "rectangularShape": FunctionWord(
-        "a b", lambda n: Trapezoid(n[0], n[0], n[1], n[1])
-    ),
-    "sShape": FunctionWord("a b", lambda n: SCurve(n[0], n[1])),
-    "zShape": FunctionWord("a b", lambda n: SCurve(n[1], n[0])),
-    **function_words("fml"),
+    "singletonShape": FunctionWord("a", lambda n, _: Singleton(n[0])),
 }
 
 
@@ -135,7 +124,7 @@ def curve_of(term: FmlElement, where: str, notes: ReaderNotes) -> Curve | None:
         numbers = [number(shape, f"param{k + 1}", notes) for k in range(word.arity)]
         if len(notes.mistakes) > before:
             return None
-        curve = word.make(numbers)
+        curve = word.make(numbers, "jfml")
         if shape.name == "piShape":
             what = "a piShape falls behind its second number as it rose before it"
             notes.remark(f"{where}: {what}, as in the reference implementation")
