@@ -10,6 +10,7 @@ from .c_text import remark as remark
 from .c_text import whole_lines as whole_lines
 from .c_text import whole_table as whole_table
 from .onnx import FORMAT_VERSION as FORMAT_VERSION
+from .onnx import OPERATORS as OPERATORS
 from .onnx import Output as Output
 from .onnx import check_outputs as check_outputs
 from .onnx import check_versions as check_versions

@@ -50,6 +50,20 @@ OPSETS = range(12, 27)
 IRS = range(4, 14)
 """The file versions that can be written; constants need no input from 4 on."""
 
+OPERATORS: Mapping[str, str] = {
+    **dict.fromkeys(
+        """
+        Abs Add And ArgMax Cast Ceil Clip Concat ConstantOfShape CumSum Div Equal Exp
+        Expand Floor Gather GatherElements Greater Less LessOrEqual Log MatMul Max Min
+        Mod Mul Neg Not Or Pad Pow ReduceMax ReduceMin ReduceSum Reshape Round Shape Sin
+        Slice Split Sqrt Sub Sum Tanh Transpose Unsqueeze Where
+        """.split(),  # noqa: SIM905
+        "",
+    ),
+    "TreeEnsemble": "ai.onnx.ml",
+}
+"""All operators that are written, with their domains."""
+
 OLDEST: Mapping[str, str] = {
     "rules": "1.15.0",
     "plain tree": "1.15.0",

@@ -58,6 +58,7 @@ def open_bare(content: bytes, threads: int = 1) -> Bare:
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.log_severity_level = _SILENT
+    options.add_session_config_entry("session.load_model_format", "ONNX")
     session = onnxruntime.InferenceSession(
         content, options, providers=["CPUExecutionProvider"]
     )

@@ -17,7 +17,7 @@ import numpy as np
 
 from fuzzytree import exporters
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
-from fuzzytree.exporters import FORMAT_VERSION, Output, write_onnx
+from fuzzytree.exporters import FORMAT_VERSION, OPERATORS, Output, write_onnx
 from fuzzytree.model import (
     Dtype,
     FloatArray,
@@ -35,6 +35,7 @@ from fuzzytree.model import (
     Variable,
     text_fault,
 )
+from fuzzytree.runtimes.onnx_sizes import graph_size
 from fuzzytree.runtimes.rows import checked
 
 if TYPE_CHECKING:
@@ -44,8 +45,21 @@ if TYPE_CHECKING:
     Outputs = dict[str, npt.NDArray[Any]]
 
 _LARGEST_FILE = 128 * 2**20
-_STANDARD_DOMAINS = ("", "ai.onnx", "ai.onnx.ml")
+_MOST_NUMBERS = 2**28  # that the nodes of a graph compute in one call
+_ANEW = "export the model anew"
 _CACHE_BYTES = 2**18
+_FIELDS: Mapping[str, str] = {
+    "ModelProto": "ir_version producer_name producer_version domain model_version "
+    "doc_string graph opset_import metadata_props",
+    "GraphProto": "node name initializer doc_string input output value_info",
+    "NodeProto": "input output name op_type domain attribute doc_string",
+    "AttributeProto": "name doc_string type f i s t floats ints strings tensors",
+    "TensorProto": "dims data_type name doc_string raw_data float_data int32_data "
+    "string_data int64_data double_data uint64_data",
+    "TypeProto": "tensor_type denotation",
+}
+"""The fields of messages that a graph without functions, graphs within, sparse
+constants and data elsewhere can have; other messages have no other fields."""
 
 Labels = tuple[str | None, ...]
 
@@ -124,7 +138,7 @@ class OnnxModel(Facts, frozen=True, kw_only=True):
             raises ValueError.
         run_labelled: The same with the file's own labels, None for "no class"; None in
             place of the function if the file has no output `label`.
-        content: The file.
+        content: What runs: the file, written anew of what was read.
         run_system: The numbers of a fuzzy system; None for trees and rules. A file
             without the output `status` does not distinguish a default from a number.
     """
@@ -155,14 +169,14 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
     facts = _facts(proto, name)
     _check_signature(proto, facts, name)
 
-    bare = loaded(content, name)
+    bare = loaded(proto, name, _rows_at_once(facts))
     is_system, has_labels = facts.representation == "system", "label" in facts.outputs
     refuse = functools.partial(_refuse, facts.name)
     return OnnxModel(
         **msgspec.structs.asdict(facts),
         run=refuse if is_system else _runner(bare, facts),
         run_labelled=_labelled_runner(bare, facts) if has_labels else None,
-        content=content,
+        content=proto.SerializeToString(),
         run_system=_system_runner(bare, facts) if is_system else None,
     )
 
@@ -364,7 +378,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
 def _rows_at_once(facts: Facts) -> int:
     """Return how many rows are answered together, so that they stay in the cache."""
     if facts.representation == "tree":
-        return 2**16
+        return max(2**12, min(2**16, 2**22 // facts.rules))
     if facts.representation == "system":
         return min(max(facts.chunk, 1), 2**16)
     degree = 8 if facts.dtype == "float64" else 4
@@ -393,10 +407,11 @@ def _tabulator(facts: Facts) -> Callable[[FloatArray], npt.NDArray[np.generic]]:
 
 
 def parsed(content: bytes, name: str) -> onnx.ModelProto:
-    """Return an ONNX file as its parts, if it may be run.
+    """Return an ONNX file as its parts, all of which are understood.
 
     Raises:
-        ReadError: If it is none, too large, or holds what a model does not need.
+        ReadError: If it is none, too large, of others, or holds what a model does not
+            need.
         MissingExtraError: If onnx or onnxruntime is not installed.
     """
     _require_packages("reading")
@@ -406,19 +421,36 @@ def parsed(content: bytes, name: str) -> onnx.ModelProto:
             f"and {_LARGEST_FILE >> 20} are the most that is read"
         )
     proto = _decoded(content, name)
-    for danger in _dangers(proto):
-        raise ReadError(f"{name}: {danger}")
+    for fault in _part_faults(proto):
+        raise ReadError(f"{name}: {fault}; {_ANEW}")
+    texts_of(proto, name)
+    for fault in _operator_faults(proto):
+        raise ReadError(f"{name}: {fault}; {_ANEW}")
     return proto
 
 
-def loaded(content: bytes, name: str) -> exporters.Bare:
-    """Return what runs an ONNX file.
+def loaded(proto: onnx.ModelProto, name: str, rows: int) -> exporters.Bare:
+    """Return what runs a parsed file: its parts, written anew, and no other bytes.
+
+    Args:
+        proto: The parts.
+        name: What to call the file.
+        rows: The most in one call.
 
     Raises:
-        ReadError: If onnxruntime does not load it.
+        ReadError: If a call would compute too much, or onnxruntime does not load it.
     """
     try:
-        return exporters.open_bare(content)
+        size = graph_size(proto, rows)
+    except ValueError as error:
+        raise ReadError(f"{name}: {error}; {_ANEW}") from error
+    if size > _MOST_NUMBERS:
+        raise ReadError(
+            f"{name}: its nodes compute {size:.2g} numbers in a call of {rows} rows, "
+            f"and {_MOST_NUMBERS:.2g} are the most that is run; {_ANEW}"
+        )
+    try:
+        return exporters.open_bare(proto.SerializeToString())
     except exporters.RUNTIME_ERRORS as error:
         text = f"{name}: onnxruntime does not load it: {exporters.first_line(error)}"
         raise ReadError(text) from error
@@ -456,9 +488,14 @@ def _decoded(content: bytes, name: str) -> onnx.ModelProto:
         DecodeError,
     )
 
+    if content[4:8] == b"ORTM":
+        raise ReadError(
+            f"{name}: this is in onnxruntime's own format, or seems so to it; "
+            "export the model as ONNX"
+        )
     try:
         return onnx.load_from_string(content)
-    except DecodeError as error:
+    except (DecodeError, UnicodeDecodeError) as error:
         text = f"{name}: this is no ONNX file, or only a part of one"
         raise ReadError(text) from error
 
@@ -495,26 +532,44 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
     return facts
 
 
-def _dangers(proto: onnx.ModelProto) -> Iterator[str]:
-    """Yield why a file should not be run: parts elsewhere, operators of others."""
-    own = {(function.domain, function.name) for function in proto.functions}
-    bodies = [proto.graph.node, *(function.node for function in proto.functions)]
-    tensors = list(proto.graph.initializer)
-    if proto.graph.sparse_initializer or proto.training_info:
-        yield "it holds more than the graph of a fuzzytree model"
-    for nodes in bodies:
-        for node in nodes:
-            if node.domain not in _STANDARD_DOMAINS and (
-                (node.domain, node.op_type) not in own
-            ):
-                yield f"operator {node.op_type!r} of {node.domain!r} is not ONNX's own"
-            for attribute in node.attribute:
-                tensors += [attribute.t, *attribute.tensors]
-                if attribute.HasField("g") or attribute.graphs:
-                    yield f"operator {node.op_type!r} holds a graph of its own"
-    for tensor in tensors:
-        if tensor.external_data or tensor.data_location:
-            yield f"constant {tensor.name!r} lies in another file"
+def _part_faults(message: Any) -> Iterator[str]:
+    """Yield the parts of a file that no graph of ours has, and broken texts."""
+    from google.protobuf.message import Message
+    from google.protobuf.unknown_fields import (  # type: ignore[import-untyped]
+        UnknownFieldSet,
+    )
+
+    kind = message.DESCRIPTOR.name
+    for entry in UnknownFieldSet(message):
+        yield f"its {kind} has a field {entry.field_number}, which ONNX does not know"
+    for field, value in message.ListFields():
+        values = [value] if isinstance(value, str | bytes | Message) else value
+        if kind in _FIELDS and field.name not in _FIELDS[kind].split():
+            yield f"its {kind} has {field.name!r}, which no graph of fuzzytree has"
+        elif field.message_type is not None:
+            for part in values:
+                yield from _part_faults(part)
+        elif (
+            field.cpp_type == field.CPPTYPE_STRING
+            and field.name != "raw_data"
+            and not all(map(_is_text, values))
+        ):
+            yield f"its {kind} has a {field.name!r} that is no UTF-8"
+
+
+def _is_text(value: str | bytes) -> bool:
+    try:
+        return isinstance(value, str) or value.decode() is not None
+    except UnicodeDecodeError:
+        return False
+
+
+def _operator_faults(proto: onnx.ModelProto) -> Iterator[str]:
+    """Yield the operators that are never written, those of other domains among them."""
+    for node in proto.graph.node:
+        if OPERATORS.get(node.op_type) != node.domain:
+            whose = f" of {node.domain!r}" if node.domain else ""
+            yield f"no graph of fuzzytree has the operator {node.op_type!r}{whose}"
 
 
 def _check_signature(proto: onnx.ModelProto, facts: Facts, name: str) -> None:

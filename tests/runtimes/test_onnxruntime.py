@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import numpy as np
 import onnx
 import onnxruntime
 import pytest
-from onnx import TensorProto, helper
+from onnx import TensorProto, helper, numpy_helper
 
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters.onnx import OLDEST, Output, write_onnx
@@ -348,6 +349,67 @@ def _nest(proto: onnx.ModelProto) -> None:
     inner.g.name = "inner"
 
 
+def _add_sparse(proto: onnx.ModelProto) -> None:
+    sparse = proto.graph.node[0].attribute.add(name="sparse_value", type=11)
+    sparse.sparse_tensor.dims.append(2**40)
+
+
+def _nest_functions(proto: onnx.ModelProto) -> None:
+    """Add functions each of which calls the one before twice."""
+    for number in range(28):
+        before = ("f", f"f{number - 1}") if number else ("", "Neg")
+        nodes = [
+            helper.make_node(before[1], [a], [b], domain=before[0])
+            for a, b in (("x", "y"), ("y", "z"))
+        ]
+        imports = [helper.make_opsetid("", 17), helper.make_opsetid("f", 1)]
+        proto.functions.append(
+            helper.make_function("f", f"f{number}", ["x"], ["z"], nodes, imports)
+        )
+    proto.opset_import.add(domain="f", version=1)
+    _add_nodes(proto, ("f27", "inputs", "more"))
+
+
+def _add_nodes(proto: onnx.ModelProto, *nodes: tuple[str, ...]) -> None:
+    """Add nodes, of each the operator, the inputs and the result."""
+    for operator, *inputs, result in nodes:
+        domain = "f" if operator.startswith("f") else ""
+        node = helper.make_node(operator, inputs, [result], domain=domain)
+        if operator == "Concat":
+            node.attribute.append(helper.make_attribute("axis", 0))
+        proto.graph.node.append(node)
+
+
+def _make_huge(proto: onnx.ModelProto) -> None:
+    sides = numpy_helper.from_array(np.array([20_000, 20_000]), "sides")
+    proto.graph.initializer.append(sides)
+    _add_nodes(proto, ("ConstantOfShape", "sides", "huge"))
+
+
+def _double(proto: onnx.ModelProto) -> None:
+    proto.graph.initializer.append(numpy_helper.from_array(np.ones(2), "double_0"))
+    names = [f"double_{number}" for number in range(51)]
+    _add_nodes(proto, *(("Concat", a, a, b) for a, b in itertools.pairwise(names)))
+
+
+def _size_by_value(proto: onnx.ModelProto) -> None:
+    side = numpy_helper.from_array(np.array([2e5]), "side")
+    proto.graph.initializer.append(side)
+    _add_nodes(proto, ("Mul", "side", "side", "large"))
+    cast = helper.make_node("Cast", ["large"], ["size"], to=TensorProto.INT64)
+    proto.graph.node.append(cast)
+    _add_nodes(proto, ("ConstantOfShape", "size", "zeros"))
+
+
+def _break_label(proto: onnx.ModelProto) -> None:
+    (texts,) = (t for t in proto.graph.initializer if t.string_data)
+    texts.string_data[0] = b"\xff"
+
+
+UNKNOWN = b"\xa0\x38\x01"  # the field 900 is 1
+ORT = "this is in onnxruntime's own format, or seems so to it; export the model as ONNX"
+
+
 def _drop_rule(proto: onnx.ModelProto) -> None:
     del proto.graph.output[1]
     _set_fact(proto, "outputs", '["label"]')
@@ -396,15 +458,75 @@ HOSTILE = {
     ),
     "external data": (
         _changed(_move_out),
-        "constant 'index_1' lies in another file",
+        "its TensorProto has 'external_data', which no graph of fuzzytree has; "
+        "export the model anew",
     ),
     "custom operator": (
         _changed(_call_home),
-        "operator 'Transpose' of 'com.example' is not ONNX's own",
+        "no graph of fuzzytree has the operator 'Transpose' of 'com.example'; "
+        "export the model anew",
     ),
     "subgraph": (
         _changed(_nest),
-        "operator 'Transpose' holds a graph of its own",
+        "its AttributeProto has 'g', which no graph of fuzzytree has; "
+        "export the model anew",
+    ),
+    "sparse constant": (
+        _changed(_add_sparse),
+        "its AttributeProto has 'sparse_tensor', which no graph of fuzzytree has; "
+        "export the model anew",
+    ),
+    "nested functions": (
+        _changed(_nest_functions),
+        "its ModelProto has 'functions', which no graph of fuzzytree has; "
+        "export the model anew",
+    ),
+    "operator of others": (
+        _changed(lambda proto: _add_nodes(proto, ("Tile", "inputs", "index_1"))),
+        "no graph of fuzzytree has the operator 'Tile'; export the model anew",
+    ),
+    "huge constant": (
+        _changed(_make_huge),
+        "its nodes compute 4e+08 numbers in a call of 65536 rows, and 2.7e+08 are the "
+        "most that is run; export the model anew",
+    ),
+    "constant doubled 50 times": (
+        _changed(_double),
+        "its nodes compute 4.5e+15 numbers in a call of 65536 rows, and 2.7e+08 are "
+        "the most that is run; export the model anew",
+    ),
+    "size of a value": (
+        _changed(_size_by_value),
+        "the size of 'zeros' is not known before it runs; export the model anew",
+    ),
+    "unknown field": (
+        write_onnx(random_tree(1)).content + UNKNOWN,
+        "its ModelProto has a field 900, which ONNX does not know; "
+        "export the model anew",
+    ),
+    "unknown field of a node": (
+        _changed(lambda proto: proto.graph.node[0].MergeFromString(UNKNOWN)),
+        "its NodeProto has a field 900, which ONNX does not know; "
+        "export the model anew",
+    ),
+    "onnxruntime's own format": (
+        b"\xa2\x38\x05\0ORTM" + write_onnx(random_tree(1)).content,
+        ORT,
+    ),
+    "onnxruntime's magic in a name": (
+        _changed(lambda proto: setattr(proto, "producer_name", "ORTM")),
+        ORT,
+    ),
+    "broken text": (
+        write_onnx(random_tree(1)).content.replace(
+            b"fuzzytree.kind", b"fuzzytree.\xff\xfe\xfd\xfc"
+        ),
+        "its StringStringEntryProto has a 'key' that is no UTF-8; "
+        "export the model anew",
+    ),
+    "broken label": (
+        _changed(_break_label),
+        "its TensorProto has a 'string_data' that is no UTF-8; export the model anew",
     ),
     "no rule": (
         _changed(_drop_rule),
@@ -421,6 +543,37 @@ def test_a_file_that_is_not_ours_is_refused_with_one_sentence(
     with pytest.raises(ReadError) as caught:
         open_onnx(content, "shipped.onnx")
     assert str(caught.value) == f"shipped.onnx: {text}"
+
+
+def test_the_parts_that_were_read_are_what_runs_in_whatever_order_they_stand() -> None:
+    content = write_onnx(random_tree(1)).content
+    proto = onnx.load_from_string(content)
+    name = b"\x12\x04ORTM"  # its producer's name is onnxruntime's magic
+    result = open_onnx(content.replace(b"\x12\x09fuzzytree", b"", 1) + name, "m.onnx")
+    proto.producer_name = "ORTM"
+    assert result.content == proto.SerializeToString()
+    assert result.content[4:8] == b"ORTM"
+    honest = open_onnx(content, "m.onnx")
+    values = probe_values(random_tree(1), 100)
+    assert_equal_bits(result.run(values), honest.run(values))
+
+
+@pytest.mark.heavy
+def test_no_changed_byte_of_a_file_ends_in_a_traceback() -> None:
+    content = write_onnx(random_tree(1, leaves=3, inputs=2)).content
+    values = np.zeros((2, 3))
+    refused = 0
+    for place, byte in enumerate(content):
+        for change in (0x01, 0x80):
+            broken = content[:place] + bytes([byte ^ change]) + content[place + 1 :]
+            try:
+                result = open_onnx(broken, "m.onnx")
+                assert result.run_labelled is not None
+                if len(result.inputs) == 2:
+                    result.run_labelled(values)
+            except (ReadError, LossError):
+                refused += 1
+    assert refused > len(content)
 
 
 def test_a_file_that_answers_in_another_shape_is_refused_at_running() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fuzzytree.errors import ReadError, install_hint
 from fuzzytree.model import Model
-from fuzzytree.runtimes import COMPILERS, compiled, loaded
+from fuzzytree.runtimes import COMPILERS, compiled, loaded, parsed
 from fuzzytree.tactile.exporters.c_frames import write_frames_c
 from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
 from fuzzytree.tactile.features import frame_program
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 NUMPY, ONNX, C, PLAIN = "numpy", "onnx", "c", "plain Python"
 
+_FRAMES_AT_ONCE = 2**12  # in one call of a graph
 _OUTPUTS: tuple[Output, ...] = ("label", "state", "rule", "features")
 
 Answers = Mapping[Output, "npt.NDArray[Any]"]
@@ -122,11 +123,10 @@ def _graph(content: bytes, name: str) -> Runner:
             the runner raises it if onnxruntime does not run it, or if it has no answer
             for a frame.
     """
-    import onnx
-
     from fuzzytree.exporters import RUNTIME_ERRORS, first_line
 
-    bare, proto = loaded(content, name), onnx.load_model_from_string(content)
+    proto = parsed(content, name)
+    bare = loaded(proto, name, _FRAMES_AT_ONCE)
     outputs: list[Any] = [entry.name for entry in proto.graph.output]
     is_known = 0 < len(outputs) == len({*outputs} & {*get_args(Output)})
     if not is_known or [entry.name for entry in proto.graph.input] != ["frames"]:
@@ -135,10 +135,15 @@ def _graph(content: bytes, name: str) -> Runner:
 
     def run(frames: Cells) -> Answers:
         try:
-            found = [*map(np.asarray, bare(outputs, {"frames": frames}))]
+            starts = range(0, len(frames), _FRAMES_AT_ONCE)
+            parts = [
+                bare(outputs, {"frames": frames[start : start + _FRAMES_AT_ONCE]})
+                for start in starts
+            ]
         except RUNTIME_ERRORS as error:
             text = f"{name}: onnxruntime does not run it: {first_line(error)}"
             raise ReadError(text) from error
+        found = [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
         if any(one.shape[:1] != (len(frames),) for one in found):
             raise ReadError(f"{name}: it does not give an answer for each frame")
         return dict(zip(outputs, found, strict=True))
