@@ -263,7 +263,7 @@ def test_costs_are_measured_in_every_stage(tmp_path: Path) -> None:
 @pytest.mark.heavy
 def test_a_tree_of_one_leaf_needs_nothing_and_is_timed() -> None:
     tree = random_tree(1, leaves=1)
-    footprint = report(tree, pruned(tree), seconds=600.0)
+    footprint = report(tree, pruned(tree), budget_s=600.0)
     assert footprint.proof.ok
     assert footprint.needs.inputs == ()
     assert {cost.what for cost in footprint.costs} == {"open", "one row", "10,000 rows"}
@@ -305,7 +305,7 @@ def test_what_float32_cannot_hold_is_an_omission() -> None:
 
 def test_a_report_fits_its_schema_and_says_the_same_in_words() -> None:
     tree = random_tree(3, leaves=4)
-    footprint = report(tree, pruned(tree), seconds=0.2)
+    footprint = report(tree, pruned(tree), budget_s=0.2)
     facts = json.loads(footprint.to_json())
     schema = json.loads((ROOT / "schemas" / "needs.schema.json").read_bytes())
     jsonschema.Draft202012Validator(schema).validate(facts)

@@ -80,6 +80,6 @@ def test_a_budget_of_nothing_or_without_end_is_refused(budget: float) -> None:
 
 
 def test_a_choice_that_leaves_nothing_to_ask_is_refused() -> None:
-    message = "^select and ignore leave no code to answer$"
+    message = "^select and skip leave no code to answer$"
     with pytest.raises(ValueError, match=message):
         chosen_codes(["FT2"], ["FT2"])

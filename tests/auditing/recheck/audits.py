@@ -47,7 +47,7 @@ def audited(
     file = model_file("grip.yaml", content)
     repeat = "fuzzytree audit grip.yaml"
     wanted = AuditSelection(
-        select=options.pop("select", ()), ignore=options.pop("ignore", ["FT6"])
+        select=options.pop("select", ()), skip=options.pop("skip", ["FT6"])
     )
     material = Material(model, file, rows, options.pop("data", None))
     found = audit(material, selection=wanted, repeat=repeat, **options)

@@ -140,7 +140,7 @@ def test_audits_of_every_form_hold(kind: str) -> None:
         norm: Conjunction = "product" if kind == "product" else "minimum"
         shapes: Kind = "band" if kind == "band" else "points"
         model = random_base(3, 4, 2, norm, shapes, shared=0.5)
-    report = recheck(*audited(model, ignore=["FT6", "FT204"]), ("a.json", "m.yaml"))
+    report = recheck(*audited(model, skip=["FT6", "FT204"]), ("a.json", "m.yaml"))
     assert report.wrong == []
 
 
@@ -159,7 +159,7 @@ def test_audits_of_odd_models_hold(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_each_field_that_is_edited_is_reported_or_free(seed: int) -> None:
     model = random_base(seed, 3, 2, kind="points", shared=0.5)
-    assert missed(*audited(model, ignore=["FT6", "FT7"]), seed, 6) == []
+    assert missed(*audited(model, skip=["FT6", "FT7"]), seed, 6) == []
 
 
 @pytest.mark.heavy
@@ -169,7 +169,7 @@ def test_each_field_of_many_audits_that_is_edited_is_reported_or_free(
 ) -> None:
     kind: Kind = "points" if seed % 2 else "band"
     model = random_base(seed, 3, 2, kind=kind, shared=0.5)
-    assert missed(*audited(model, ignore=["FT6", "FT7"]), seed, 25) == []
+    assert missed(*audited(model, skip=["FT6", "FT7"]), seed, 25) == []
 
 
 def test_the_digest_shows_any_edit() -> None:
@@ -270,7 +270,7 @@ def test_a_planted_defect_holds(planted: Planted) -> None:
         options["domain"] = Domain(sides)
     if planted.code == "FT701":
         options["rows"] = AuditRows("rows.csv", ROWS.T)
-    report = recheck(*audited(model, ignore=["FT6"], **options), ("a.json", "m.yaml"))
+    report = recheck(*audited(model, skip=["FT6"], **options), ("a.json", "m.yaml"))
     assert report.wrong == []
 
 
@@ -280,7 +280,7 @@ def test_what_is_proved_is_always_decided_again(seed: int) -> None:
     kinds: tuple[Kind, ...] = ("points", "band", "lr")
     norm: Conjunction = "product" if seed % 2 else "minimum"
     model = random_base(seed, 3, 2, norm, kinds[seed % 3], shared=0.5)
-    report = recheck(*audited(model, ignore=["FT6", "FT7"]), ("a.json", "m.yaml"))
+    report = recheck(*audited(model, skip=["FT6", "FT7"]), ("a.json", "m.yaml"))
     assert report.wrong == []
     assert "PROVED" not in {state for state, _ in report.undecided}
 
