@@ -112,10 +112,12 @@ def test_a_rule_that_cannot_fire_is_named() -> None:
     system = system_of(CONDITIONS[0], IMPOSSIBLE)
     proof = ft.convert(system, "onnx").proof
     assert proof.verdict == "alike"
-    assert proof.sentence.endswith("probes like the system, in which 1 of 2 rules fire")
+    assert proof.sentence.endswith(
+        "generated rows like the system, in which 1 of 2 rules fire"
+    )
     assert proof.coverage is not None
     assert proof.coverage.unfired == (2,)
-    assert proof.coverage.sentences[0] == "no probe fires rule 2 of 2"
+    assert proof.coverage.sentences[0] == "no generated row fires rule 2 of 2"
 
 
 def test_a_system_that_mostly_answers_its_default_is_reported() -> None:
@@ -136,7 +138,9 @@ def test_a_system_that_covers_its_ranges_has_nothing_to_report() -> None:
 def test_many_rules_that_do_not_fire_are_named_in_a_line() -> None:
     shown = ", ".join(map(str, range(1, 21)))
     found = Coverage(30, tuple(range(1, 24)), 10, 0)
-    assert found.sentences == (f"no probe fires rules {shown} and 3 more of 30",)
+    assert found.sentences == (
+        f"no generated row fires rules {shown} and 3 more of 30",
+    )
 
 
 def test_rows_are_drawn_from_the_ranges_themselves() -> None:

@@ -65,7 +65,7 @@ class RowSet(msgspec.Struct, frozen=True):
         """Return what people call a row: `probe 3`, or `row 3` of the data."""
         number = int(self.numbers[row])
         if number < self.probes:
-            return f"probe {number + 1}"
+            return f"generated row {number + 1}"
         return f"row {number - self.probes + 1}"
 
     def text(self, row: int) -> str:

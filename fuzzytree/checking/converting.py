@@ -511,8 +511,8 @@ def _decided(model: Document, other: Document) -> str:
     rows = probes(model, limit=_TRIED)
     changed = [r for r in rows if evaluate(model, r).rule != evaluate(other, r).rule]
     if changed:
-        return f"; another rule wins in {len(changed)} of {len(rows)} probes"
-    return f"; the same rule wins in all of {len(rows)} probes"
+        return f"; another rule wins in {len(changed)} of {len(rows)} generated rows"
+    return f"; the same rule wins in all of {len(rows)} generated rows"
 
 
 def _certified(model: Model, form: Format, dtype: object) -> Proof:
@@ -536,7 +536,8 @@ def _run(system: FuzzySystem, written: Written) -> Proof:
     model = open_onnx(written.content, "the file")
     agreement = check(system, model, runtimes=[], limit=_FEW)
     agreement.raise_if_not_ok()
-    text = f"run by onnxruntime, it answers {agreement.probes} probes like the system"
+    rows = f"{agreement.probes} generated rows"
+    text = f"run by onnxruntime, it answers {rows} like the system"
     coverage = agreement.coverage
     if coverage is not None and coverage.unfired:
         fired = coverage.rules - len(coverage.unfired)

@@ -182,9 +182,7 @@ rows_only_option = flag(
     "--rows-only", "Accept a file that predicts the same although its content differs."
 )
 
-data_option = option(
-    "--data TABLE", "Table of rows to use in addition to the generated probes."
-)
+data_option = option("--data TABLE", "Table of rows to use beside the generated rows.")
 runtimes_option = several(
     "--runtime NAME", "Runtime to use (repeat); all installed runtimes by default."
 )

@@ -144,7 +144,7 @@ class Coverage(msgspec.Struct, frozen=True):
             more = len(self.unfired) - 20
             shown += f" and {more} more" if more > 0 else ""
             noun = "rule" if len(self.unfired) == 1 else "rules"
-            result.append(f"no probe fires {noun} {shown} of {self.rules}")
+            result.append(f"no generated row fires {noun} {shown} of {self.rules}")
         if 2 * self.uncovered > self.rows:
             result.append(
                 f"in {self.uncovered} of {self.rows} rows drawn evenly from the ranges "

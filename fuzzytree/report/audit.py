@@ -122,8 +122,8 @@ def audit_lines(
         if missed:
             yield f"not examined, or not to the end: {counted(len(missed), 'code')}"
         yield (
-            f"this audit does not establish {counted(len(audit.limits), 'thing')}; "
-            "--verbose lists them, with the evidence of each finding"
+            f"--verbose lists the evidence of each finding and the "
+            f"{counted(len(audit.limits), 'limit')} of this audit"
         )
         return
     if audit.accepted:

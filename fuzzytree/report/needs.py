@@ -56,12 +56,12 @@ _SIZES = 5  # rows of the table of sizes: head, columns, bytes, terms, the first
 def _verdict(footprint: Footprint) -> str:
     """Return how many inputs are needed, and what can be left out."""
     needs = footprint.needs
-    of = f" of {needs.columns} columns" if needs.columns else ""
+    of = f" of {needs.columns} columns" if needs.columns else " inputs"
     count = len(footprint.removed)
-    parts = f"{counted(count, 'part')} can be left out" if count else "all parts needed"
     wrong = sum(c.verdict == "DISAGREES" for c in footprint.proof.comparisons)
     agrees = "" if not wrong else f"; the pruned model differs in {wrong} comparisons"
-    return f"{needs.model}: needs {len(needs.inputs)}{of}; {parts}{agrees}"
+    can = f"{counted(count, 'part')} can be left out" if count else "already minimal"
+    return f"{needs.model}: needs {len(needs.inputs)}{of}; {can}{agrees}"
 
 
 def _head(needs: Needs) -> Iterator[str]:
@@ -81,7 +81,6 @@ def _removed_lines(
     title: str, removed: Sequence[Removed], most: int | None
 ) -> Iterator[str]:
     if not removed:
-        yield f"{title}: nothing"
         return
     rows = [(title, "why", "changes")]
     rows += [(one.where, one.why, one.changes or "nothing") for one in removed[:most]]

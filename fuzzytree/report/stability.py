@@ -12,8 +12,15 @@ _INPUTS_SHOWN = 6  # inputs that float32 is not safe for, unless all are printed
 _SAFE = "float32 is safe"
 
 CRITERION = ("code", "stability check", "cases", "worst", "verdict")
-_STIFF = ("input", "spread/size", "float32 costs", "observed", "flips", "advice")
-_OFFSET = ("form", "spread/distance", "float32", "mixed", "double", "flips in float32")
+_STIFF = ("input", "spread/size", "float32 costs", "observed", "changed", "advice")
+_OFFSET = (
+    "form",
+    "spread/distance",
+    "float32",
+    "mixed",
+    "double",
+    "changed in float32",
+)
 _CURVE = ("curve", "form", "size", "leaves [0, 1]", "rises", "advice")
 
 
@@ -27,8 +34,8 @@ def stability_lines(study: Stability, *, is_verbose: bool = False) -> Iterator[s
     rows = f", {counted(study.rows, 'row')} of data" if study.rows else ""
     rows += f", {study.tried} of them tried" if study.tried < study.rows else ""
     runtimes = counted(len(study.runtimes), "runtime")
-    probes = counted(study.probes, "probe")
-    yield f"{study.model}: {stability_verdict(study)} ({probes}{rows}; {runtimes})"
+    made = counted(study.probes, "generated row")
+    yield f"{study.model}: {stability_verdict(study)} ({made}{rows}; {runtimes})"
     if is_verbose:
         yield f"runtimes: {', '.join(study.runtimes) or 'none'}"
     yield from aligned([CRITERION, *map(criterion_row, study.criteria)])

@@ -131,6 +131,8 @@ def agreement_lines(agreement: Agreement, *, is_verbose: bool = False) -> Iterat
         if shown:
             yield from aligned([COMPARISON, *map(comparison_row, shown)])
         yield from more_line(len(wrong) - len(shown), "comparison")
+    if any(one.verdict == "differs by design" for one in comparisons):
+        yield "by design, raw rules (the paper's) differ; relative rules equal the tree"
     for comparison in shown:
         if comparison.detail and (is_verbose or comparison in wrong):
             yield f"{comparison.representation} compared with {comparison.against}:"
@@ -154,7 +156,7 @@ def _groups(comparisons: Sequence[Comparison]) -> Iterator[tuple[str, ...]]:
     groups: dict[str, list[Comparison]] = {}
     for one in comparisons:
         title = one.against.rpartition(": ")[2]
-        name = "calls of all kinds" if one.basis == "calls" else title
+        name = "itself, in other calls" if one.basis == "calls" else title
         groups.setdefault(name, []).append(one)
     for name, members in groups.items():
         verdicts = Counter(one.verdict for one in members)
@@ -220,9 +222,10 @@ def _basis_text(agreement: Agreement) -> str:
         )
     )
     data = rows - agreement.probes
-    text = counted(agreement.probes, "probe")
+    text = counted(agreement.probes, "generated row")
     text += f", {counted(data, 'row')} of data" if data else ""
-    return text + (f", {counted(agreement.cells, 'cell')}" if agreement.cells else "")
+    cells = counted(agreement.cells or 0, "region") + " between cuts"
+    return text + (f", {cells}" if agreement.cells else "")
 
 
 def comparison_row(one: Comparison) -> tuple[str, ...]:
@@ -256,8 +259,8 @@ def comparison_row(one: Comparison) -> tuple[str, ...]:
 CERTIFIED = (
     "compared with exact arithmetic",
     "largest error",
-    "inside the band",
-    "flips",
+    "uncertain",
+    "changed",
     "verdict",
     "certified",
 )
@@ -270,7 +273,7 @@ def certified_row(one: Certified) -> tuple[str, ...]:
         flips += f" (margin up to {one.largest_flip_margin:.2g})"
     if one.cover_lost or one.cover_gained:
         flips += f", cover lost in {one.cover_lost}, gained in {one.cover_gained}"
-    noun = "row" if one.on == "data" else "probe"
+    noun = "row" if one.on == "data" else "generated row"
     return (
         one.representation,
         "-" if one.largest is None else f"{one.largest:.2g}",

@@ -133,7 +133,7 @@ def test_a_file_with_another_number_is_found_in_its_rows() -> None:
     one = about(agreement, "file 1", "rows")
     assert one.largest_difference == 1.0
     assert "output 'time'" in one.detail[0]
-    assert "probe" in one.detail[0]
+    assert "generated row" in one.detail[0]
 
 
 def test_the_worst_row_comes_first_with_its_values() -> None:

@@ -83,7 +83,7 @@ def test_one_ulp_of_a_strength_disagrees_with_equal_bits() -> None:
     assert result.largest_difference == math.nextafter(0.9, 1) - 0.9
     assert result.detail == (
         "only strengths differ: every row has the same class",
-        "probe 1: x 1.0: base answers a (rule 1) with 0.9, "
+        "generated row 1: x 1.0: base answers a (rule 1) with 0.9, "
         "moved a (rule 1) with 0.9000000000000001",
     )
 
@@ -180,7 +180,11 @@ def test_a_margin_lies_between_classes_and_not_between_rules() -> None:
 
 
 def test_data_rows_are_numbered_from_one_behind_the_probes() -> None:
-    assert [ROWS.name(0), ROWS.name(1), ROWS.name(2)] == ["probe 1", "row 1", "row 2"]
+    assert [ROWS.name(0), ROWS.name(1), ROWS.name(2)] == [
+        "generated row 1",
+        "row 1",
+        "row 2",
+    ]
     assert ROWS.part(slice(None, None, 2)).name(1) == "row 2"
 
 

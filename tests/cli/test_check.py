@@ -32,7 +32,7 @@ def test_a_model_and_its_files_agree(call: Call) -> None:
     assert code == 0
     lines = out.splitlines()
     assert lines[0].startswith("grip: none of ")
-    assert lines[0].endswith(" probes, 4 rows of data, 4 cells)")
+    assert lines[0].endswith(" generated rows, 4 rows of data, 4 regions between cuts)")
     assert lines[1].split("  ")[0] == "compared with"
     assert "DISAGREES" not in out
     assert err == ""
@@ -93,7 +93,7 @@ def test_rows_that_do_not_fit_are_one_sentence(call: Call) -> None:
 def test_comparisons_that_agree_are_counted_unless_all_are_wanted(call: Call) -> None:
     short = call("check", "grip.yaml", *NATIVE)[1]
     full = call("check", "grip.yaml", "--verbose", *NATIVE)[1]
-    line = "calls of all kinds  2            0                   2 agree\n"
+    line = "itself, in other calls  2            0                   2 agree\n"
     assert line in short
     assert line not in full
     assert full.count(" calls ") == 2
@@ -102,11 +102,11 @@ def test_comparisons_that_agree_are_counted_unless_all_are_wanted(call: Call) ->
 def test_a_disagreement_is_reported_with_its_worst_row() -> None:
     wrong = Comparison(
         "x.onnx", "tree", "rows", 9, "DISAGREES", 2, 0.25, 0.0, "equal bits", 2, 0.5,
-        ("probe 1: force 2.0: tree answers soft, x.onnx firm",),
+        ("generated row 1: force 2.0: tree answers soft, x.onnx firm",),
     )  # fmt: skip
     found = Agreement("grip", "0" * 64, (wrong,), probes=9)
     assert list(agreement_lines(found)) == [
-        "grip: 1 of 1 comparison disagrees (9 probes)",
+        "grip: 1 of 1 comparison disagrees (9 generated rows)",
         "compared with  comparisons  largest difference  result",
         "tree           1            0.25                1 DISAGREES",
         "representation  compared with  on    rows  largest difference  allowed  "
@@ -114,7 +114,7 @@ def test_a_disagreement_is_reported_with_its_worst_row() -> None:
         "x.onnx          tree           rows  9     0.25                0        "
         "DISAGREES in 2 (margin up to 0.5)",
         "x.onnx compared with tree:",
-        "  probe 1: force 2.0: tree answers soft, x.onnx firm",
+        "  generated row 1: force 2.0: tree answers soft, x.onnx firm",
     ]
 
 
@@ -126,27 +126,28 @@ def test_certificates_stand_behind_all_the_rest() -> None:
     )  # fmt: skip
     tree = Certified(
         "tree in mixed", "mixed", "no path can differ", None, "derived", "probes", 9,
-        None, 0, 1, None, 0, 0, 0, "DISAGREES", ("probe 1: force 2.0: exactly soft",),
+        None, 0, 1, None, 0, 0, 0, "DISAGREES",
+        ("generated row 1: force 2.0: exactly soft",),
     )  # fmt: skip
     found = Agreement("grip", "0" * 64, (), probes=9, certificates=(mixed, tree))
     assert not found.ok
     head, one, other, *said = list(agreement_lines(found, is_verbose=True))[2:]
     flips = "1 (margin up to 3.1e-07), cover lost in 1, gained in 0"
-    start = "compared with exact arithmetic  largest error  inside the band  "
-    assert head == f"{start}{'flips':{len(flips)}}  verdict    certified"
-    start = "rules in mixed                  9.6e-08        2 of 178 rows    "
+    start = "compared with exact arithmetic  largest error  uncertain              "
+    assert head == f"{start}{'changed':{len(flips)}}  verdict    certified"
+    start = "rules in mixed                  9.6e-08        2 of 178 rows          "
     assert one == f"{start}{flips}  agrees     {sentence}"
-    start = "tree in mixed                   -              0 of 9 probes    "
+    start = "tree in mixed                   -              0 of 9 generated rows  "
     assert other == f"{start}{'1':{len(flips)}}  DISAGREES  no path can differ"
     assert said == [
         "tree in mixed compared with exact arithmetic:",
-        "  probe 1: force 2.0: exactly soft",
+        "  generated row 1: force 2.0: exactly soft",
     ]
     with pytest.raises(DisagreementError) as caught:
         found.raise_if_not_ok()
     assert str(caught.value) == (
         "tree in mixed disagrees with exact arithmetic\n"
-        "  probe 1: force 2.0: exactly soft"
+        "  generated row 1: force 2.0: exactly soft"
     )
 
 

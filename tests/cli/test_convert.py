@@ -287,7 +287,7 @@ def test_options_reach_the_writer(call: Call) -> None:
 def test_an_onnx_file_of_a_system_is_run_before_it_is_believed(call: Call) -> None:
     code, _, err = call("convert", "tipper.fll", "tipper.onnx")
     assert code == 0
-    proof = "run by onnxruntime, it answers 200 probes like the system"
+    proof = "run by onnxruntime, it answers 200 generated rows like the system"
     assert f"proved   alike       {proof}\n" in err
     code, _, err = call("convert", "tipper.fll", "tipper.c")
     said = "the file is not read back here; other programs run it"

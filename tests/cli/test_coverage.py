@@ -1,4 +1,4 @@
-"""Rules that no probe fires, and systems that mostly answer their default."""
+"""Rules that no generated row fires, and systems that mostly answer their default."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _here(folder: Path) -> None:
 def test_a_verb_reports_what_probes_do_not_reach(call: Call, verb: list[str]) -> None:
     code, _, err = call(*verb)
     assert code == 0
-    assert "remark   no probe fires rule 2 of 2\n" in err
+    assert "remark   no generated row fires rule 2 of 2\n" in err
     assert "rows drawn evenly from the ranges of the inputs an output has no" in err
     facts = json.loads(call(*verb, "--json")[1])
     assert facts["coverage"]["unfired"] == [2]
@@ -40,7 +40,7 @@ def test_a_verb_reports_what_probes_do_not_reach(call: Call, verb: list[str]) ->
 def test_check_reports_what_probes_do_not_reach(call: Call) -> None:
     code, out, _ = call("check", "s.fll", "--runtime", "native")
     assert code == 0
-    assert "\nno probe fires rule 2 of 2\n" in out
+    assert "\nno generated row fires rule 2 of 2\n" in out
     assert "rows drawn evenly from the ranges of the inputs an output has no" in out
     facts = json.loads(call("check", "s.fll", "--runtime", "native", "--json")[1])
     assert facts["coverage"]["unfired"] == [2]

@@ -28,7 +28,7 @@ def test_a_sound_model_holds(call: Call) -> None:
     first, second = out.splitlines()[:2]
     said = "grip: 9 of 11 stability checks pass, none fails ("
     assert first.startswith(said)
-    assert first.endswith(" probes, 4 rows of data; 2 runtimes)")
+    assert first.endswith(" generated rows, 4 rows of data; 2 runtimes)")
     assert second == "runtimes: native, native float32"
     assert "FAILS" not in out
     assert err == ""

@@ -207,9 +207,9 @@ def _decision(run: ModelRun, *, has_ties: bool) -> ModelRun:
 
 def _alike(question: Convention, titles: Sequence[str]) -> AuditAnswer:
     name, count = question.name, question.values.shape[1]
-    how = f"each probe was answered by {', '.join(titles)}"
+    how = f"each generated row was answered by {', '.join(titles)}"
     if question.left_out:
-        how += f"; {question.left_out} more probes were left out"
+        how += f"; {question.left_out} more generated rows were left out"
     message = "FT602.alike" if count else "FT602.none"
     facts = {"count": len(titles), "probes": count}
     return audit_answer(message, name, Computed(how), facts=facts)

@@ -113,7 +113,7 @@ def agreement_answers(
 
 
 def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> AuditAnswer:
-    noun = "probes and rows" if one.basis == "rows" else "ways"
+    noun = "rows" if one.basis == "rows" else "ways"
     facts = "; ".join(one.detail[:2])
     state: State = Computed(f"both were run or read; {facts}")
     if subject.system is None and one.row_numbers:

@@ -83,7 +83,7 @@ FT103.by-place note
   may decide by its place
 FT103.superfluous info
   {subject} is superfluous: nowhere is it stronger than all other rules, and without it
-  no decision changes[{later:?}, but where strengths only touch]
+  no decision changes[{later:?}, apart from exact ties]
 FT103.open note
   it is open whether {subject} is needed
 FT103.left-open note
@@ -176,24 +176,24 @@ FT204.not-sought note
 FT204.decided note
   the row is decided as {then:q} by {by}
 FT204.alike note
-  all of the domain is decided as {name}, {then:q}[{aside:?}, places where strengths
-  only touch aside]
+  no row of the domain has another class than {name}, {then:q}[{aside:?}, apart from
+  exact ties]
 FT204.none-known note
   no decision other than {then:q} is known around {name}
 FT204.nearest note
-  {name} stays {then:q} within {certified radius, in ranges:p} of each input's
-  range[{aside:?}, places where strengths only touch aside]; where {moved:at} it is
-  {other:q}
+  {name} is {then:q}; where {moved:at} it becomes {other:q}, and it stays {then:q} while
+  no input changes by more than {certified radius, in ranges:p} of its range[{aside:?},
+  apart from exact ties]
 FT204.nearest-of-many note
-  {name} stays {then:q} within {certified radius, in ranges:p} of each input's
-  range[{aside:?}, places where strengths only touch aside]; where {moved:d} inputs move
-  by no more than {distance of the witness, in ranges:p} it is {other:q}
+  {name} is {then:q}; where {moved:d} inputs change by up to {distance of the witness,
+  in ranges:p} of their ranges it becomes {other:q}, and it stays {then:q} while none
+  changes by more than {certified radius, in ranges:p}[{aside:?}, apart from exact ties]
 FT204.rows note
   of {total:d} rows[ ({incomplete:d} incomplete or outside the domain)] {rows
   evaluated:d} different ones [{different:?}with the smallest margins ]were evaluated:
   each keeps its decision within at least {smallest certified radius, in ranges:p} of
   each input's range, half of them within {median certified radius, in
-  ranges:p}[{aside:?}, places where strengths only touch aside]
+  ranges:p}[{aside:?}, apart from exact ties]
 FT204.more-rows note
   {count:n more row is|more rows are} not evaluated
 FT205.leaves-declined note
@@ -280,10 +280,10 @@ FT501.size-of-view note
   audited as {rules:n rule} with {propositions:n proposition}[, index of Nauck {index
   of Nauck:s}]
 FT601.alike note
-  {count:n representation answers|representations answer} alike on up to {rows:d} probes
-  and rows
+  {count:n representation gives|representations give} the same answers on up to {rows:d}
+  rows
 FT601.alike-by-calls note
-  {count:n representation answers|representations answer} alike however called
+  {count:n representation gives|representations give} the same answers in other calls
 FT601.equal note
   {count:n representation is|representations are} equal on every input
 FT601.disagrees error
@@ -298,11 +298,13 @@ FT601.certified note
 FT601.band note
   {representation}: the class is open on {hits:d} of {rows:d} {noun}
 FT602.alike note
-  {subject}: {count:d} representations answer {probes:d} probes alike
+  {subject}: {count:d} representations give the same answers to {probes:d} generated
+  rows
 FT602.none note
-  {subject}: no probe of it was met
+  {subject}: no generated row shows it
 FT602.differs error
-  {convention}: {representation} differs in {count:d} of {probes:d} probes: {detail}
+  {convention}: {representation} differs in {count:d} of {probes:d} generated rows:
+  {detail}
 FT701.missing info?
   on {hits:d} of {rows:d} rows a value is missing
 FT701.outside info?

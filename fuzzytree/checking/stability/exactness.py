@@ -61,7 +61,7 @@ def _fact(name: str, checks: Sequence[ExactCheck]) -> str:
     worst = max(checks, key=lambda one: one.worst)
     flips = max(one.flips for one in checks)
     text = f"{name}: strengths off by at most {worst.worst:.2g}"
-    text += f" where {worst.allowed:.2g} is allowed, flips: {flips}"
+    text += f" where {worst.allowed:.2g} is allowed, classes changed: {flips}"
     unbounded = max(one.unbounded for one in checks)
     if unbounded:
         text += f"; no bound in {unbounded}, beyond the type or near a step"

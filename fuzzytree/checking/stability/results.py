@@ -177,16 +177,16 @@ class Stability(msgspec.Struct, frozen=True):
 
 
 TITLES = {
-    "N1": "powers of two change no bit",
-    "N2": "offsets cost what the bound says",
-    "N2b": "features 20 decades apart",
-    "N3": "order, copies and batches change no bit",
-    "N4": "degenerate terms and batches",
-    "N5": "edges are exact",
-    "N6": "special values as declared",
-    "N7": "curves: condition, overshoot, rise",
-    "N8": "within the certified bound",
-    "N9": "files come back",
+    "N1": "scaling inputs by powers of two changes no bit",
+    "N2": "shifting inputs stays within the error bound",
+    "N2b": "inputs 20 decades apart in size change no bit",
+    "N3": "row order, copies and batch size change no bit",
+    "N4": "terms without width and unusual batches work",
+    "N5": "values on the edges of terms are exact",
+    "N6": "missing and infinite values are answered as declared",
+    "N7": "fitted curves are well conditioned and monotone",
+    "N8": "errors stay within the certified bound",
+    "N9": "saving and reading returns the same bits",
     "N10": "error against run time",
 }
 """What each criterion demands."""

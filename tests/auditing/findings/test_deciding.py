@@ -130,7 +130,7 @@ def test_a_rule_below_its_own_class_is_superfluous() -> None:
         "without it no decision changes"
     )
     # At a point where it is as strong as rule 4, its place would decide.
-    assert found[3,].sentence == f"{sentence}, but where strengths only touch"
+    assert found[3,].sentence == f"{sentence}, apart from exact ties"
     alone = _found(_asked(*CLEAN, ("small", "a")), "FT103")
     assert alone[3,].sentence == sentence
 

@@ -173,7 +173,7 @@ def test_a_runtime_of_systems_in_which_nan_is_a_number_is_found() -> None:
     (finding,) = conventions.system_answers(subject, question, pairs)
     assert finding.is_finding
     assert finding.sentence.startswith(
-        "missing values: blind differs in 12 of 12 probes: probe 1: a "
+        "missing values: blind differs in 12 of 12 generated rows: generated row 1: a "
     )
     assert finding.sentence.endswith(": native gives a number to other outputs")
 
@@ -244,7 +244,10 @@ def test_a_graph_that_breaks_a_convention_is_found_and_a_right_one_is_not(
     (clean,) = answered(subject, question, graph(rules))
     assert not clean.is_finding
     count = question.values.shape[1]
-    assert clean.sentence == f"{name}: 2 representations answer {count} probes alike"
+    assert (
+        clean.sentence
+        == f"{name}: 2 representations give the same answers to {count} generated rows"
+    )
     if name in PLANTED:
         (finding,) = answered(subject, question, graph(PLANTED[name]))
         assert finding.is_finding
@@ -263,8 +266,9 @@ def test_a_runtime_in_which_nan_is_a_number_is_found() -> None:
     ]
     (finding,) = conventions.convention_answers(subject, question, found)
     assert finding.sentence == (
-        "missing values: blind: rules differs in 6 of 6 probes: probe 1: force nan: "
-        "native: rules answers no class (missing), blind: rules soft (rule 1)"
+        "missing values: blind: rules differs in 6 of 6 generated rows: generated row "
+        "1: force nan: native: rules answers no class (missing), blind: rules soft "
+        "(rule 1)"
     )
     assert isinstance(finding.state, Computed)
 
@@ -282,10 +286,10 @@ def test_the_witness_of_a_broken_convention_lies_in_the_domain() -> None:
 def test_a_question_without_a_probe_says_so_and_one_with_too_many_too() -> None:
     subject = subject_of(RULES)
     (none,) = answered(subject, Convention("ties", np.empty((1, 0))), None)
-    assert none.sentence == "ties: no probe of it was met"
+    assert none.sentence == "ties: no generated row shows it"
     (some,) = answered(subject, Convention("ties", np.array([[1.0]]), 3), None)
     assert isinstance(some.state, Computed)
-    assert some.state.how.endswith("; 3 more probes were left out")
+    assert some.state.how.endswith("; 3 more generated rows were left out")
 
 
 def test_probes_are_of_every_kind_and_stay_few() -> None:

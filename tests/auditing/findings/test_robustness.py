@@ -38,8 +38,8 @@ def test_the_radius_of_a_row_of_a_tree_is_the_distance_to_its_cut() -> None:
     assert not found.is_finding
     assert (found.measures[0].value, found.measures[0].exact) == (0.25, "1/4")
     assert found.sentence == (
-        "the row stays 'a' within 25 % of each input's range; where 'x' is 0.5001 "
-        "it is 'b'"
+        "the row is 'a'; where 'x' is 0.5001 it becomes 'b', and it stays 'a' while "
+        "no input changes by more than 25 % of its range"
     )
     assert isinstance(found.state, Witness)
     assert found.state.claims[0].label == "b"
@@ -51,7 +51,7 @@ def test_the_point_that_is_reported_is_decided_as_the_sentence_says() -> None:
     assert isinstance(rules, RuleBase)
     subject = subject_of(rules, limits={"force": (0.0, 10.0), "slip": (0.0, 2.0)})
     found = radius(subject, {"force": 4.9, "slip": 0.3})
-    assert found.sentence.endswith("; where 'force' is 5.000001 it is 'soft'")
+    assert "; where 'force' is 5.000001 it becomes 'soft', and" in found.sentence
     decided = decider_of(subject).decided
     slip = Fraction(0.3)
     assert decided({"force": Fraction("5.000001"), "slip": slip})[0] == "soft"
@@ -74,7 +74,7 @@ def test_the_radius_to_a_combination_is_shared_by_its_inputs() -> None:
 
 def test_a_domain_decided_alike_has_no_other_decision() -> None:
     found = radius(subject_of(one_cut(), limits={"x": (0.0, 0.4)}), {"x": 0.25})
-    assert found.sentence == "all of the domain is decided as the row, 'a'"
+    assert found.sentence == "no row of the domain has another class than the row, 'a'"
     assert isinstance(found.state, Proved)
 
 
@@ -91,22 +91,22 @@ def test_the_radius_of_a_row_of_rules_is_found_by_their_strengths(
     assert found.state.claims[0].of == "rules"
 
 
-def test_places_where_strengths_only_touch_are_named_where_another_goes_first() -> None:
+def test_exact_ties_are_named_where_another_rule_goes_first() -> None:
     raw = subject_of(one_cut(0.25)).raw
     assert raw is not None
     subject = subject_of(raw, rows=[[0.75]])
     whole, second = answers(subject)
-    assert ", places where strengths only touch aside; where 'x' is" in second.sentence
-    assert whole.sentence.endswith(", places where strengths only touch aside")
+    assert second.sentence.endswith(" of its range, apart from exact ties")
+    assert whole.sentence.endswith(", apart from exact ties")
     # The class of the first rule wins all ties, so there is nothing to leave out.
     whole, first = answers(subject_of(raw, rows=[[0.1]]))
-    assert "touch" not in first.sentence + whole.sentence
+    assert "ties" not in first.sentence + whole.sentence
 
 
 def test_a_row_has_its_decision_first_and_then_its_radius() -> None:
     first, second = row_answers(subject_of(one_cut()), {"x": 0.75})
     assert first.sentence == "the row is decided as 'b' by leaf 2"
-    assert second.sentence.startswith("the row stays 'b' within 25 %")
+    assert second.sentence.endswith("by more than 25 % of its range")
 
 
 def test_a_row_outside_the_domain_is_refused() -> None:

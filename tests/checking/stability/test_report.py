@@ -42,13 +42,13 @@ STUDY = Stability(
 )
 
 TEXT = """\
-grip: 1 of 3 stability checks fails: N3 (12 probes, 30000 rows of data, 20000 of them \
-tried; 2 runtimes)
+grip: 1 of 3 stability checks fails: N3 (12 generated rows, 30000 rows of data, \
+20000 of them tried; 2 runtimes)
 runtimes: native, native float32
-code  stability check                          cases  worst  verdict
-N3    order, copies and batches change no bit  40     -      FAILS
-N7    curves: condition, overshoot, rise       3      0.01   passes
-N10   error against run time                   -      -      not applicable
+code  stability check                                  cases  worst  verdict
+N3    row order, copies and batch size change no bit   40     -      FAILS
+N7    fitted curves are well conditioned and monotone  3      0.01   passes
+N10   error against run time                           -      -      not applicable
 N3: native: tree: 5 of 8 rows
 N3: native: tree: 4 of 8 rows
 N3: native: tree: 3 of 8 rows
@@ -60,10 +60,10 @@ N10: not tried: a
 N10: not tried: b
 N10: not tried: c
 N10: not tried: d
-input  spread/size  float32 costs  observed  flips    advice
+input  spread/size  float32 costs  observed  changed  advice
 force  5.0e-07      1.2e-01        1.0e-01   3 of 80  use mixed
 slip   5.0e-01      1.0e-07        0.0e+00   0 of 80  float32 is safe
-form   spread/distance  float32  mixed    double   flips in float32
+form   spread/distance  float32  mixed    double   changed in float32
 rules  1e-03            cannot   1.0e-07  2.0e-16  -
 curve             form  size  leaves [0, 1]  rises  advice
 force low (left)  raw   70    by 0.12        -      fit it with fewer points
