@@ -434,7 +434,7 @@ def certify(
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> certify(random_tree(1, combinations=0)).sentence
-        'no path can differ: no value is rounded before it meets a cut'
+        'the class cannot change: no value is rounded before it meets a cut'
     """
     if dtype not in get_args(Dtype):
         known = ", ".join(get_args(Dtype))

@@ -221,28 +221,30 @@ class Certificate(msgspec.Struct, frozen=True):
     def sentence(self) -> str:
         """Return what it says about decisions, for people."""
         if self.dtype is None:
-            return "no decision can differ: every number is written in full, error 0"
+            return "the class cannot change: every number is written in full, error 0"
         if self.representation == "tree":
             return self._of_paths()
         if self.delta is None:
             return f"no bound: {'; '.join(self.reasons)}"
         if self.delta >= 0.5:
-            return f"no decision is certain: a strength can be off by {self.delta:.1e}"
-        text = (
-            "no decision can differ where the margin exceeds "
-            f"2 x {short_above(self.delta)}"
-        )
+            return f"any class can change: a strength can be off by {self.delta:.1e}"
+        text = "the class cannot change: every strength is exact"
+        if self.delta > 0.0:
+            text = (
+                "the class cannot change unless the two strongest classes differ by "
+                f"{short_above(2.0 * self.delta)} or less"
+            )
         return "; ".join([text, *self.reasons])
 
     def _of_paths(self) -> str:
         if self.reasons:
             return f"no bound: {'; '.join(self.reasons)}"
         if not self.values:
-            return "no path can differ: no value is rounded before it meets a cut"
+            return "the class cannot change: no value is rounded before it meets a cut"
         worst = max(self.values, key=lambda value: value.error)
         return (
-            "no path can differ where each value is farther from the cuts than its "
-            f"rounding, at most {short_above(worst.error)} ({worst.variable})"
+            "the class cannot change for values farther than "
+            f"{short_above(worst.error)} from a cut ({worst.variable})"
         )
 
 
@@ -278,8 +280,8 @@ def certify(
         >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(0, combinations=0))
-        >>> certify(rules, "mixed").sentence
-        'no decision can differ where the margin exceeds 2 x 1.2e-07'
+        >>> certify(rules, "mixed").sentence.partition(" unless ")[2]
+        'the two strongest classes differ by 2.4e-07 or less'
     """
     if isinstance(model, FuzzyTree):
         return _certify_tree(model, dtype, values)

@@ -216,7 +216,8 @@ def test_exact_strengths_agree_and_the_data_are_counted() -> None:
     assert (result.verdict, result.on, result.rows) == ("agrees", "data", 2)
     assert (result.largest, result.flips, result.in_band) == (0.0, 0, 0)
     assert result.sentence == (
-        "no decision can differ where the margin exceeds 2 x 3.5e-16"
+        "the class cannot change unless the two strongest classes differ by 6.7e-16 "
+        "or less"
     )
 
 

@@ -31,7 +31,7 @@ def test_size_and_hash_of_the_file_are_reported(call: Call) -> None:
     assert (code, out) == (0, "")
     assert err == (
         f"wrote    new.onnx onnx, {len(content)} bytes, sha256 {digest}\n"
-        "bound    float64  no path can differ: "
+        "bound    float64  the class cannot change: "
         "no value is rounded before it meets a cut\n"
         "next     fuzzytree check grip.yaml new.onnx\n"
     )
@@ -54,12 +54,16 @@ def test_json_reports_the_same_facts(call: Call) -> None:
         "names": {},
         "proof": {
             "verdict": "certified",
-            "sentence": "no path can differ: no value is rounded before it meets a cut",
+            "sentence": (
+                "the class cannot change: no value is rounded before it meets a cut"
+            ),
         },
         "coverage": None,
         "next": "fuzzytree check grip.yaml new.onnx",
         "certificate": {
-            "sentence": "no path can differ: no value is rounded before it meets a cut",
+            "sentence": (
+                "the class cannot change: no value is rounded before it meets a cut"
+            ),
             "dtype": "float64",
             "carrier": "tree",
             "delta": None,
@@ -80,9 +84,9 @@ def test_the_certificate_is_that_of_the_number_type_that_was_written(
     words = ("export", "grip.yaml", "-o", "new.onnx", "--as", "rules")
     _, _, double = call(*words)
     _, _, single = call(*words, "--dtype", "float32")
-    text = "no decision can differ where the margin exceeds 2 x"
-    assert f"bound    float64  {text} 3.5e-16\n" in double
-    assert f"bound    float32  {text} 5.4e-07\n" in single
+    text = "the class cannot change unless the two strongest classes differ by"
+    assert f"bound    float64  {text} 6.7e-16 or less\n" in double
+    assert f"bound    float32  {text} 1.1e-06 or less\n" in single
 
 
 @pytest.mark.parametrize("representation", ["tree", "rules"])
@@ -91,7 +95,7 @@ def test_a_file_that_holds_the_model_changes_nothing(
 ) -> None:
     words = ("export", "grip.yaml", "-o", "new.yaml", "--as", representation, "--json")
     code, out, err = call(*words)
-    sentence = "no decision can differ: every number is written in full, error 0"
+    sentence = "the class cannot change: every number is written in full, error 0"
     assert code == 0
     what = "tree" if representation == "tree" else "rule base"
     proof = f"read back from the file, the {what} is equal in every number"

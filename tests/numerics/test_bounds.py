@@ -56,7 +56,8 @@ def test_the_sentence_names_twice_the_largest_error_of_a_strength() -> None:
     found = certify(grip(LOW), "mixed")
     assert found.delta == pytest.approx(2 * 2.0**-24, rel=1e-2)
     assert found.sentence == (
-        "no decision can differ where the margin exceeds 2 x 1.2e-07"
+        "the class cannot change unless the two strongest classes differ by 2.4e-07 "
+        "or less"
     )
 
 
@@ -64,8 +65,8 @@ def test_the_number_in_the_sentence_is_not_below_the_bound() -> None:
     for seed in range(30):
         found = certify(rules_from_tree(random_tree(seed, combinations=0)), "mixed")
         assert found.delta is not None
-        assert found.sentence.startswith("no decision can differ")
-        assert float(found.sentence.rsplit(" ", 1)[1]) >= found.delta
+        text = found.sentence.removesuffix(" or less")
+        assert float(text.rsplit(" ", 1)[1]) >= 2.0 * found.delta
 
 
 def test_a_product_adds_the_errors_of_its_factors() -> None:
@@ -138,7 +139,7 @@ def test_rows_without_a_bound_are_counted() -> None:
     found = certify(grip(STEP), "float32", np.array([[0.5, 1.0, 1e300]]))
     assert (found.delta, found.unbounded, found.rows) == (0.0, 2, 3)
     assert found.sentence == (
-        "no decision can differ where the margin exceeds 2 x 0; no bound in 2 of 3 "
+        "the class cannot change: every strength is exact; no bound in 2 of 3 "
         "rows: a value is beyond float32, or rounding can put it on the other side of "
         "a step"
     )
@@ -148,13 +149,13 @@ def test_a_strength_that_can_be_half_wrong_makes_no_decision_certain() -> None:
     narrow = Term("low", Band(high=1e9, right=1e9 + 250.0))
     found = certify(grip(narrow), "float32")
     assert found.delta is not None
-    assert found.sentence.startswith("no decision is certain: a strength can be off by")
+    assert found.sentence.startswith("any class can change: a strength can be off by")
 
 
 def test_a_tree_that_asks_inputs_alone_is_exact_in_double() -> None:
     tree = random_tree(1, combinations=0)
     assert certify(tree, "float64").sentence == (
-        "no path can differ: no value is rounded before it meets a cut"
+        "the class cannot change: no value is rounded before it meets a cut"
     )
     assert not open_paths(tree, "float64", values_of(tree)).any()
 
@@ -164,7 +165,7 @@ def test_a_tree_names_the_value_that_is_rounded_most() -> None:
     found = certify(tree, "float32", values_of(tree, 100)[:, :50])
     worst = max(found.values, key=lambda value: value.error)
     assert found.sentence.endswith(f"({worst.variable})")
-    assert found.sentence.startswith("no path can differ where each value is farther")
+    assert found.sentence.startswith("the class cannot change for values farther than ")
 
 
 @pytest.mark.one_in(3)

@@ -100,7 +100,7 @@ def test_what_a_number_type_can_change_is_bounded_and_how_often_is_sampled() -> 
     found = {one.subject: one for one in answers(subject_of(RULES, rows))}
     facts = found["rules in float32"]
     assert facts.sentence.startswith(
-        "rules in float32: no decision can differ where the margin exceeds 2 x "
+        "rules in float32: the class cannot change unless the two strongest "
     )
     assert isinstance(facts.state, Computed)
     assert facts.state.how.endswith("for values in the domain")
