@@ -31,6 +31,7 @@ from fuzzytree.formats import (
     LONGEST_NAME,
     RULE_WORDS,
     differences,
+    joined_twice,
     read_fll,
     word_for,
 )
@@ -129,6 +130,7 @@ def write(
     comments = [f"# {one}" for one in (TITLE, facts) if one]
     text = "\n".join([*comments, *_text(system, names)]) + "\n"
     remarks += [*_remarks(system, names), *differences(system)]
+    remarks += [f"output {o.name!r}: {what}" for o, what, _ in joined_twice(system)]
     return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
 
 

@@ -5,6 +5,7 @@ from .fcl.fcl_dialects import FCL_TNORMS as FCL_TNORMS
 from .fcl.fcl_dialects import JFUZZYLOGIC_PAIRS as JFUZZYLOGIC_PAIRS
 from .fcl.fcl_dialects import MARK as MARK
 from .fcl.fcl_dialects import PAIRS as PAIRS
+from .fcl.fcl_dialects import jfuzzylogic_losses as jfuzzylogic_losses
 from .fcl.fcl_reader import FACTS as FACTS
 from .fcl.fcl_reader import read_fcl as read_fcl
 from .fcl.fcl_rules import ALWAYS as ALWAYS
@@ -26,6 +27,7 @@ from .fis.fis_words import Dialect as Dialect
 from .fis.fis_words import curve_of as curve_of
 from .fll.fll_differences import differences as differences
 from .fll.fll_differences import fuzzylite_losses as fuzzylite_losses
+from .fll.fll_differences import joined_twice as joined_twice
 from .fll.fll_reader import read_fll as read_fll
 from .fll.fll_rules import RULE_WORDS as RULE_WORDS
 from .fll.fll_terms import term_in_words as term_in_words

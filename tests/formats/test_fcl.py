@@ -7,6 +7,8 @@ import random
 import pytest
 
 from fuzzytree.errors import ReadError
+from fuzzytree.formats import condition_sentence
+from fuzzytree.formats.fcl.fcl_dialects import Dialect
 from fuzzytree.formats.fcl.fcl_reader import read_fcl
 from fuzzytree.model import (
     And,
@@ -30,7 +32,7 @@ from fuzzytree.model import (
     Trapezoid,
     TwoGaussians,
 )
-from fuzzytree.model.contracts import Reading
+from fuzzytree.model.contracts import Loss, Reading
 from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import curve_degree, infer
 from tests.work import at_most
@@ -346,18 +348,128 @@ def test_jfuzzylogic_samples_the_low_ends_of_a_thousand_pieces() -> None:
     assert answer == pytest.approx(0.01 * (2 * 1000 - 1) / 3, rel=1e-13)
 
 
-def test_an_or_before_an_and_is_reported_in_a_file_of_jfuzzylogic() -> None:
+def test_jfuzzylogic_reads_and_and_or_from_left_to_right() -> None:
     reading = _read(JFUZZYLOGIC)
-    assert any(
-        "line 20: AND binds closer than OR" in remark for remark in reading.remarks
-    )
+    assert (
+        "line 20: a OR b AND c is read as (a OR b) AND c, as in jFuzzyLogic; the "
+        "standard reads a OR (b AND c)"
+    ) in reading.remarks
     first = reading.model
     assert isinstance(first, FuzzySystem)
-    assert first.rules[0].when == Or(
-        (
-            Proposition("food", ("bad",)),
-            And((Proposition("food", ("fair",)), Not(Proposition("food", ("good",))))),
-        )
+    either = Or((Proposition("food", ("bad",)), Proposition("food", ("fair",))))
+    assert first.rules[0].when == And((either, Not(Proposition("food", ("good",)))))
+
+
+EITHER = """\
+FUNCTION_BLOCK either
+VAR_INPUT a : REAL; c : REAL; d : REAL; END_VAR
+VAR_OUTPUT y : REAL; END_VAR
+FUZZIFY a TERM p := (0, 0) (1, 1); END_FUZZIFY
+FUZZIFY c TERM p := (0, 0) (1, 1); END_FUZZIFY
+FUZZIFY d TERM p := (0, 0) (1, 1); TERM n := (0, 1) (1, 0); END_FUZZIFY
+DEFUZZIFY y TERM hi := 100; TERM lo := 0; METHOD : COGS; DEFAULT := 0; END_DEFUZZIFY
+RULEBLOCK one
+  AND : MIN; ACCU : MAX;
+  RULE 1 : IF a IS p OR c IS p AND d IS p THEN y IS hi;
+  RULE 2 : IF d IS n THEN y IS lo;
+END_RULEBLOCK
+END_FUNCTION_BLOCK
+"""
+
+
+@pytest.mark.parametrize(
+    ("dialect", "answer"),
+    [("jfuzzylogic", 20.0), ("iec", 90.0 / 1.7), (None, 90.0 / 1.7)],
+)
+def test_where_engines_read_a_rule_otherwise_only_a_named_one_is_no_loss(
+    dialect: Dialect | None, answer: float
+) -> None:
+    reading = read_fcl(EITHER.encode(), "x.fcl", dialect=dialect)
+    assert isinstance(reading.model, FuzzySystem)
+    row = {"a": 0.9, "c": 0.1, "d": 0.2}
+    assert infer(reading.model, row).outputs == pytest.approx((answer,))
+    what = (
+        "a OR b AND c is read as a OR (b AND c), as in the standard; jFuzzyLogic reads "
+        "(a OR b) AND c; write parentheses, or read it as fcl:iec or fcl:jfuzzylogic "
+        "to choose"
+    )
+    assert reading.losses == (() if dialect else (Loss("line 10", what),))
+
+
+@pytest.mark.parametrize(
+    ("rule", "expected"),
+    [
+        ("a IS p AND c IS p OR d IS p", "a and c or d"),
+        ("a IS p OR c IS p OR d IS p AND a IS p", "(a or c or d) and a"),
+        ("a IS p OR (c IS p OR d IS p) AND a IS p", "(a or (c or d)) and a"),
+        ("a IS p AND (c IS p OR d IS p AND a IS p)", "a and ((c or d) and a)"),
+    ],
+)
+def test_what_stands_left_is_joined_first_in_jfuzzylogic(
+    rule: str, expected: str
+) -> None:
+    text = EITHER.replace("a IS p OR c IS p AND d IS p", rule)
+    model = read_fcl(text.encode(), "x.fcl", dialect="jfuzzylogic").model
+    assert isinstance(model, FuzzySystem)
+    when = model.rules[0].when
+    assert when is not None
+    assert condition_sentence(when).replace(" is p", "") == expected
+
+
+@pytest.mark.parametrize(
+    ("lines", "dialect", "norms"),
+    [
+        ("AND : PROD; OR : MAX;", "jfuzzylogic", ("minimum", "maximum")),
+        ("OR : MAX; AND : PROD;", "jfuzzylogic", ("product", "algebraic sum")),
+        ("AND : MIN; OR : EINSTEIN;", None, ("hamacher product", "einstein sum")),
+        ("AND : PROD; OR : MAX;", "iec", ("product", "maximum")),
+    ],
+)
+def test_of_two_operators_that_are_no_partners_jfuzzylogic_takes_the_last(
+    lines: str, dialect: Dialect | None, norms: tuple[str, str]
+) -> None:
+    text = EITHER.replace("AND : MIN;", lines)
+    reading = read_fcl(text.encode(), "x.fcl", dialect=dialect)
+    assert isinstance(reading.model, FuzzySystem)
+    (block,) = reading.model.blocks
+    assert (block.conjunction, block.disjunction) == norms
+    assert reading.losses == ()
+
+
+def test_operators_that_are_no_partners_are_a_loss_where_no_engine_is_named() -> None:
+    text = EITHER.replace("AND : MIN;", "AND : PROD; OR : MAX;")
+    assert _read(text).losses[-1] == Loss(
+        "line 8",
+        "AND and OR are no partners: both are taken, and jFuzzyLogic takes the last "
+        "one and its partner; read it as fcl:iec or fcl:jfuzzylogic to choose",
+    )
+
+
+def test_a_missing_accu_is_a_loss_where_no_engine_is_named() -> None:
+    text = PYIT2FLS.replace("    ACCU : MAX;\n", "")
+    what = (
+        "ACCU is missing: MAX is taken, and jFuzzyLogic takes SUM; read it as fcl:iec "
+        "or fcl:jfuzzylogic to choose"
+    )
+    assert _read(text).losses == (
+        Loss("output 'fan'", what),
+        Loss("output 'vent'", what),
+    )
+    norms: dict[Dialect, str] = {"iec": "maximum", "jfuzzylogic": "sum"}
+    for dialect, norm in norms.items():
+        reading = read_fcl(text.encode(), "x.fcl", dialect=dialect)
+        assert reading.losses == ()
+        assert isinstance(reading.model, FuzzySystem)
+        assert {one.aggregation for one in reading.model.outputs} == {norm}
+    assert reading.remarks[0] == "the dialect is jFuzzyLogic: as it is asked for"
+
+
+def test_a_coa_that_jfuzzylogic_computes_otherwise_is_a_loss() -> None:
+    text = JFUZZYLOGIC.replace("METHOD : COG;", "METHOD : COA;")
+    assert _read(text).losses[-1] == Loss(
+        "output 'tip'",
+        "COA is the mean of the samples that part the area most evenly; jFuzzyLogic "
+        "adds from both ends, without the first and the last sample",
     )
 
 

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fll.fll_reader import read_fll
+from fuzzytree.formats.fll.fll_reader import Dialect, read_fll
 from fuzzytree.model import (
     Activation,
     And,
@@ -43,6 +43,7 @@ from fuzzytree.model import (
     TwoGaussians,
     Variable,
 )
+from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import curve_degree, infer
 from tests.work import at_most
@@ -283,6 +284,55 @@ def test_a_curve_that_ends_before_it_starts_has_degrees_somewhere_all_the_same(
 ) -> None:
     assert output_of(term, "WeightedAverage").function == curve
     assert isinstance(output_of(term, "WeightedAverage TakagiSugeno").function, Points)
+
+
+TSUKAMOTO = """\
+InputVariable: a
+  term: p Ramp 0 1
+InputVariable: c
+  term: p Ramp 0 1
+OutputVariable: y
+  aggregation: none
+  defuzzifier: WeightedAverage Automatic
+  term: up Sigmoid 5 1
+RuleBlock: r
+  activation: General
+  rule: if a is p then y is up
+  rule: if c is p then y is up
+"""
+
+
+@pytest.mark.parametrize(
+    ("aggregation", "dialect", "answer"),
+    [
+        ("none", None, 4.540678438567827),
+        ("none", "fuzzylite", 4.540678438567827),
+        ("none", "pyfuzzylite", 6.09861228866811),
+        ("Maximum", None, 4.7993293045378485),
+        ("Maximum", "fuzzylite", 4.540678438567827),
+        ("Maximum", "pyfuzzylite", 4.7993293045378485),
+    ],
+)
+def test_two_rules_of_one_term_are_joined_as_in_the_named_engine_or_a_loss(
+    aggregation: str, dialect: Dialect | None, answer: float
+) -> None:
+    text = TSUKAMOTO.replace("none", aggregation)
+    reading = read_fll(text.encode(), "t.fll", dialect=dialect)
+    assert isinstance(reading.model, FuzzySystem)
+    found = infer(reading.model, {"a": 0.3, "c": 0.45}).outputs
+    assert found == pytest.approx((answer,), rel=1e-12)
+    what = {
+        "none": "weighted one by one, as in fuzzylite 6; pyfuzzylite adds their "
+        "degrees first",
+        "Maximum": "joined by the aggregation, as in pyfuzzylite; fuzzylite 6 adds "
+        "each",
+    }[aggregation]
+    loss = Loss(
+        "output 'y'",
+        f"rules that conclude the same term ('up') are {what}; read it as "
+        "fll:fuzzylite or fll:pyfuzzylite to choose",
+    )
+    assert reading.losses == (() if dialect else (loss,))
 
 
 def test_only_monotone_terms_are_inverted() -> None:

@@ -32,7 +32,7 @@ from fuzzytree.formats.words import (
     Words,
     meanings,
 )
-from fuzzytree.model import Defuzzifier, SNorm, TNorm, name_choice
+from fuzzytree.model import Defuzzifier, Loss, SNorm, TNorm, name_choice
 
 _Norm = TypeVar("_Norm")
 
@@ -80,6 +80,8 @@ PAIRS: Mapping[TNorm, SNorm] = {
 """The OR that an AND brings with it."""
 
 JFUZZYLOGIC_PAIRS: Mapping[TNorm, SNorm] = {**PAIRS, "hamacher product": "einstein sum"}
+CHOICE: Final = "read it as fcl:iec or fcl:jfuzzylogic to choose"
+"""What to do where the engines differ and a file does not say which one is meant."""
 
 _OF_JFUZZYLOGIC = frozenset(
     {"TRIAN", "TRAPE", "GAUSS", "GAUSS2", "GBELL", "SIGM", "DSIGM", "COSINE"}
@@ -102,24 +104,35 @@ class DialectEvidence(NamedTuple):
     weight: int = 2
 
 
-def detected(text: FclText) -> tuple[Dialect, str]:
-    """Return the dialect of a file, and a sentence that says why."""
-    named = _first_line(text.text)
+class Detection(NamedTuple):
+    """The dialect of a file, why it is, and whether only its engine reads the file."""
+
+    dialect: Dialect
+    sentence: str
+    is_certain: bool
+
+
+def detected(text: FclText, wanted: Dialect | None) -> Detection:
+    """Return the dialect of a file: the wanted one, or what its words speak for."""
+    named = wanted or _first_line(text.text)
     if named is not None:
-        return named, f"the dialect is {SHOWN[named]}: the first line says so"
+        why = "as it is asked for" if wanted else "the first line says so"
+        return Detection(named, f"the dialect is {SHOWN[named]}: {why}", True)
     result = list(_evidence(text))
     counts: Counter[Dialect] = Counter()
     for one in {(one.dialect, one.what): one for one in result}.values():
         counts[one.dialect] += one.weight
     best: Dialect = max(_ORDER, key=lambda one: (counts[one], -_ORDER.index(one)))
     if not counts[best]:
-        return "iec", "the dialect is IEC 61131-7: nothing speaks for another one"
+        sentence = "the dialect is IEC 61131-7: nothing speaks for another one"
+        return Detection("iec", sentence, False)
     sentence = f"the dialect is {SHOWN[best]}: {_listed(result, best)}"
     for other in _ORDER:
         if other == best or not counts[other]:
             continue
         sentence += f"; {SHOWN[other]} would have {_listed(result, other)}"
-    return best, sentence
+    is_certain = best in ("fuzzylite", "jfuzzylogic") and counts[best] > 1
+    return Detection(best, sentence, is_certain)
 
 
 def is_marked(text: str) -> bool:
@@ -256,3 +269,18 @@ def norm_of(
             notes.mistake(place(word), sentence)
         return words.get(word.upper())
     return None
+
+
+def jfuzzylogic_losses(name: str, how: Defuzzifier) -> Iterator[Loss]:
+    """Yield where jFuzzyLogic finds another number for an output of its own dialect.
+
+    Example:
+        >>> [one.where for one in jfuzzylogic_losses("tip", Defuzzifier("bisector"))]
+        ["output 'tip'"]
+    """
+    if how.method == "bisector":
+        what = (
+            "COA is the mean of the samples that part the area most evenly; "
+            "jFuzzyLogic adds from both ends, without the first and the last sample"
+        )
+        yield Loss(f"output {name!r}", what)

@@ -19,12 +19,15 @@ from msgspec.structs import replace
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fcl import fcl_terms
 from fuzzytree.formats.fcl.fcl_dialects import (
+    CHOICE,
     DEFUZZIFIERS,
     FCL_METHODS,
     FCL_SNORMS,
+    Detection,
     Dialect,
     detected,
     is_marked,
+    jfuzzylogic_losses,
     norm_of,
 )
 from fuzzytree.formats.fcl.fcl_rules import (
@@ -74,10 +77,15 @@ FACTS = " facts "
 _MOST_LINES = 10  # among which the facts are looked for
 
 
-def read_fcl(content: bytes, name: str) -> Reading:
+def read_fcl(content: bytes, name: str, *, dialect: Dialect | None = None) -> Reading:
     """Return the system of an FCL file, or the rule base that was written as one.
 
     Only the first FUNCTION_BLOCK is read.
+
+    Args:
+        content: The file.
+        name: What messages call it.
+        dialect: Whose meaning counts; what the file's words speak for unless given.
 
     Raises:
         ReadError: With all mistakes of the file.
@@ -99,16 +107,18 @@ def read_fcl(content: bytes, name: str) -> Reading:
     """
     text = parsed(content, name)
     notes = ReaderNotes(list(text.mistakes), remarks=list(text.remarks))
-    dialect, sentence = detected(text)
-    notes.remark(sentence)
+    detection = detected(text, dialect)
+    notes.remark(detection.sentence)
     title, blocks = blocks_of(text, notes)
-    known = known_variables(blocks, dialect, notes)
+    known = known_variables(blocks, detection, notes)
     inputs = tuple(read_input(one, known) for one in known.inputs)
     outputs = tuple(read_output(one, known) for one in known.outputs)
     labels = {one.name: [label.name for label in one.terms] for one in inputs}
     labels |= {one.name: [label.name for label in one.terms] for one in outputs}
     curved = {one.name for one in outputs if not one.defuzzifier.is_weighted}
-    scope = Scope(labels, set(known.outputs), curved, dialect, notes)
+    scope = Scope(
+        labels, set(known.outputs), curved, known.dialect, notes, known.is_certain
+    )
     read_blocks = _rule_blocks(blocks, scope)
     outputs = tuple(_aggregated(one, known, read_blocks) for one in outputs)
     if not outputs and not notes.mistakes:
@@ -200,7 +210,11 @@ def _aggregated(
         known.notes.remark(f"{where}: ACCU is missing; SUM is taken, as in jFuzzyLogic")
         return replace(output, aggregation="sum")
     if any(output.name in one.concluded for one in blocks):
-        known.notes.loss(where, "ACCU is missing, and engines differ; MAX is taken")
+        if known.is_certain:
+            known.notes.remark(f"{where}: ACCU is missing; MAX is taken")
+        else:
+            what = "ACCU is missing: MAX is taken, and jFuzzyLogic takes SUM"
+            known.notes.loss(where, f"{what}; {CHOICE}")
     return replace(output, aggregation="maximum")
 
 
@@ -223,6 +237,7 @@ class FclVariables(msgspec.Struct, frozen=True):
     outputs: dict[str, FclVariable]
     dialect: Dialect
     notes: ReaderNotes
+    is_certain: bool = True
 
     def mistake(self, token: Token, sentence: str) -> None:
         """Note a mistake at a token."""
@@ -230,10 +245,10 @@ class FclVariables(msgspec.Struct, frozen=True):
 
 
 def known_variables(
-    blocks: Sequence[FclBlock], dialect: Dialect, notes: ReaderNotes
+    blocks: Sequence[FclBlock], detection: Detection, notes: ReaderNotes
 ) -> FclVariables:
     """Return the variables of a file; mistakes are noted."""
-    known = FclVariables({}, {}, dialect, notes)
+    known = FclVariables({}, {}, detection.dialect, notes, detection.is_certain)
     for kind, variables in (("VAR_INPUT", known.inputs), ("VAR_OUTPUT", known.outputs)):
         for block in blocks:
             if block.kind == kind:
@@ -431,10 +446,15 @@ def _defuzzifier(name: str, block: FclBlock, known: FclVariables) -> Defuzzifier
     if method in ("weighted average", "weighted sum"):
         return Defuzzifier(method)
     result = replace(default, method=method)
-    known.notes.remark(
+    text = (
         f"output {name!r}: {result.samples} values of its range are looked at "
         f"({result.grid})"
     )
+    if not known.is_certain:
+        text += "; jFuzzyLogic takes 1000 (low ends), and fuzzylite 100 (middle)"
+    known.notes.remark(text)
+    if known.dialect == "jfuzzylogic":
+        known.notes.losses.extend(jfuzzylogic_losses(name, result))
     return result
 
 

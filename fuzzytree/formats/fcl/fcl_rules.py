@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Final
 
 import msgspec
@@ -10,6 +10,7 @@ from lark import Token
 from msgspec.structs import replace
 
 from fuzzytree.formats.fcl.fcl_dialects import (
+    CHOICE,
     FCL_SNORMS,
     FCL_TNORMS,
     JFUZZYLOGIC_PAIRS,
@@ -18,6 +19,7 @@ from fuzzytree.formats.fcl.fcl_dialects import (
     norm_of,
 )
 from fuzzytree.formats.fcl.fcl_syntax import (
+    Connective,
     FclBlock,
     FclCondition,
     FclJunction,
@@ -58,17 +60,22 @@ class Scope(msgspec.Struct, frozen=True):
     curved: Collection[str]
     dialect: Dialect
     notes: ReaderNotes
+    is_certain: bool = True
 
 
 def _read(text: RuleStatement, number: int, scope: Scope) -> SystemRule:
     """Return a rule; its mistakes are noted."""
     when = _condition(text.condition, scope)
-    if scope.dialect == "jfuzzylogic" and _is_ambiguous(text.condition):
-        line = text.keyword.line
-        scope.notes.remark(
-            f"line {line}: AND binds closer than OR, as in the standard; jFuzzyLogic "
-            "reads from left to right, write parentheses"
-        )
+    if _is_ambiguous(text.condition):
+        where = f"line {text.keyword.line}"
+        first, second = "(a OR b) AND c", "a OR (b AND c)"
+        if scope.dialect == "jfuzzylogic":
+            what = f"a OR b AND c is read as {first}, as in jFuzzyLogic"
+            scope.notes.remark(f"{where}: {what}; the standard reads {second}")
+        elif not scope.is_certain:
+            what = f"a OR b AND c is read as {second}, as in the standard"
+            what = f"{what}; jFuzzyLogic reads {first}; write parentheses, or {CHOICE}"
+            scope.notes.loss(where, what)
     then = tuple(_conclusion(one, scope) for one in text.conclusions)
     label = "".join(map(str, text.label))
     weight = 1.0 if text.weight is None else _weight(text.weight, scope)
@@ -91,8 +98,34 @@ def _condition(condition: FclCondition, scope: Scope) -> Condition:
         case FclNegation(part=part):
             return Not(_condition(part, scope))
         case FclJunction(connective=connective, parts=parts):
+            if scope.dialect == "jfuzzylogic":
+                return _from_the_left(condition, scope)
             result = tuple(_condition(part, scope) for part in parts)
             return And(result) if connective == "and" else Or(result)
+
+
+def _from_the_left(junction: FclJunction, scope: Scope) -> Condition:
+    """Return a condition as jFuzzyLogic reads it: AND and OR bind alike."""
+    (_, first), *others = _flat(junction, junction.connective)
+    result, last = _condition(first, scope), ""
+    for connective, part in others:
+        joint = And if connective == "and" else Or
+        same = isinstance(result, And | Or) and connective == last
+        parts = result.parts if same and isinstance(result, And | Or) else (result,)
+        result, last = joint((*parts, _condition(part, scope))), connective
+    return result
+
+
+def _flat(
+    junction: FclJunction, before: Connective
+) -> Iterator[tuple[Connective, FclCondition]]:
+    """Yield what parentheses hold together, and the word before each."""
+    for part in junction.parts:
+        if isinstance(part, FclJunction) and not part.is_grouped:
+            yield from _flat(part, before)
+        else:
+            yield before, part
+        before = junction.connective
 
 
 def _proposition(proposition: FclProposition, scope: Scope) -> Proposition:
@@ -241,22 +274,28 @@ def _norms(
     disjunction = norm_of(block, "OR", FCL_SNORMS, scope.notes)
     is_jfuzzylogic = scope.dialect == "jfuzzylogic"
     pairs = JFUZZYLOGIC_PAIRS if is_jfuzzylogic else PAIRS
+    partners = {norm: conjunction for conjunction, norm in pairs.items()}
+    if conjunction and disjunction and pairs[conjunction] != disjunction:
+        where, what = f"line {block.line}", "AND and OR are no partners"
+        if is_jfuzzylogic:
+            what = f"{what}; the last of the two and its partner count, as there"
+            scope.notes.remark(f"{where}: {what}")
+            last, other = (place(block.words(word)[0]) for word in ("AND", "OR"))
+            if last > other:
+                disjunction = pairs[conjunction]
+            else:
+                conjunction = partners.get(disjunction, conjunction)
+        elif not scope.is_certain:
+            what = f"{what}: both are taken, and jFuzzyLogic takes the last one and its"
+            scope.notes.loss(where, f"{what} partner; {CHOICE}")
     if conjunction is None and any(And in joints(rule.when) for rule in rules):
-        partners: list[TNorm] = [t for t, one in pairs.items() if one == disjunction]
-        conjunction = partners[0] if partners else "minimum"
+        conjunction = partners.get(disjunction or "maximum", "minimum")
         text = f"line {block.line}: AND is missing; {conjunction} is taken"
         scope.notes.remark(text)
     if disjunction is None and any(Or in joints(rule.when) for rule in rules):
         disjunction = pairs.get(conjunction or "minimum", "maximum")
         text = f"line {block.line}: OR is missing; {disjunction} is taken"
         scope.notes.remark(text)
-    wanted = disjunction if conjunction is None else pairs[conjunction]
-    if is_jfuzzylogic and disjunction not in (None, wanted):
-        what = (
-            "AND and OR are taken as they are written; jFuzzyLogic takes the last of "
-            "the two lines and the operator that belongs to it"
-        )
-        scope.notes.loss(f"line {block.line}", what)
     return conjunction, disjunction
 
 

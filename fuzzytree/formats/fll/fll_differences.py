@@ -21,6 +21,7 @@ from fuzzytree.model import (
     SCurve,
     SemiEllipse,
     Singleton,
+    SNorm,
     SystemOutput,
     Term,
     names_in,
@@ -30,17 +31,17 @@ from fuzzytree.semantics import value_at
 
 def differences(system: FuzzySystem) -> Iterator[str]:
     """Yield where fuzzylite 6 and pyfuzzylite 8 mean other things by a file."""
-    counts = Counter(
+    concluded_names = {
         (one.output, one.term) for rule in system.rules for one in rule.then
-    )
+    }
     for output in system.outputs:
         yield from constant_degrees(output)
         if output.defuzzifier.is_weighted:
             concluded = [
-                label for label in output.terms if counts[output.name, label.name]
+                label
+                for label in output.terms
+                if (output.name, label.name) in concluded_names
             ]
-            twice = [one for one in concluded if counts[output.name, one.name] > 1]
-            yield from _joined_twice(output, twice)
             if any(map(_is_infinite_at_zero, concluded)):
                 yield (
                     f"output {output.name!r}: a rule of degree 0 counts nothing, as in "
@@ -83,20 +84,27 @@ def _area_remarks(outputs: Sequence[SystemOutput]) -> Iterator[str]:
         )
 
 
-def _joined_twice(output: SystemOutput, twice: Sequence[Term]) -> Iterator[str]:
-    """Yield what happens to labels that several rules conclude."""
-    names = ", ".join(repr(one.name) for one in twice[:3])
-    same = f"output {output.name!r}: rules that conclude the same term ({names})"
-    if twice and output.aggregation is not None:
-        yield (
-            f"{same} are joined by the aggregation, as in pyfuzzylite; fuzzylite 6 "
-            "adds each"
-        )
-    elif any(_depends_on_degree(one) for one in twice):
-        yield (
-            f"{same} are weighted one by one, as in fuzzylite 6; pyfuzzylite adds "
-            "their degrees first"
-        )
+def joined_twice(system: FuzzySystem) -> Iterator[tuple[SystemOutput, str, SNorm]]:
+    """Yield outputs with numbers that engines join differently, and a sentence on it.
+
+    Fuzzylite 6 takes each rule alone. The last value is how pyfuzzylite joins those
+    that conclude the same term.
+    """
+    counts = Counter(
+        (one.output, one.term) for rule in system.rules for one in rule.then
+    )
+    for output in system.outputs:
+        twice = [one for one in output.terms if counts[output.name, one.name] > 1]
+        if not twice or not output.defuzzifier.is_weighted:
+            continue
+        names = ", ".join(repr(one.name) for one in twice[:3])
+        same = f"rules that conclude the same term ({names}) are"
+        if output.aggregation is not None:
+            what = "joined by the aggregation, as in pyfuzzylite; fuzzylite 6 adds each"
+            yield output, f"{same} {what}", output.aggregation
+        elif any(map(_depends_on_degree, twice)):
+            what = "weighted one by one, as in fuzzylite 6; pyfuzzylite adds their "
+            yield output, f"{same} {what}degrees first", "sum"
 
 
 def _depends_on_degree(label: Term) -> bool:

@@ -10,14 +10,14 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import PurePath
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import msgspec
 from msgspec.structs import replace
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fll import fll_words as fll
-from fuzzytree.formats.fll.fll_differences import differences
+from fuzzytree.formats.fll.fll_differences import differences, joined_twice
 from fuzzytree.formats.fll.fll_rules import FllVariable, Vocabulary, read_rule
 from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree, read_term
 from fuzzytree.formats.fll.fll_words import MOST_BYTES, FllEntry, FllSection, read_page
@@ -58,9 +58,17 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics import as_written
 
+Dialect = Literal["fuzzylite", "pyfuzzylite"]
 
-def read_fll(content: bytes, name: str) -> Reading:
+
+def read_fll(content: bytes, name: str, *, dialect: Dialect | None = None) -> Reading:
     r"""Return what an FLL file says.
+
+    Args:
+        content: The file.
+        name: What messages call it.
+        dialect: Whose meaning counts where fuzzylite 6 and pyfuzzylite differ on how
+            the numbers of a term are joined; else it is a loss.
 
     Raises:
         ReadError: With every mistake of the file.
@@ -84,6 +92,8 @@ def read_fll(content: bytes, name: str) -> Reading:
     if notes.mistakes or parts is None:
         raise report(name, notes.mistakes)
     system, positions = parts
+    is_own = "Written by fuzzytree." in page.comments
+    system = _joined(system, dialect, notes, is_own=is_own)
     model, facts = as_written(system, page.comments)
     return notes.reading(model, locating(positions, facts))
 
@@ -124,6 +134,27 @@ def _system(
         return None
     notes.remarks.extend(differences(system))
     return system, positions
+
+
+def _joined(
+    system: FuzzySystem, dialect: Dialect | None, notes: ReaderNotes, *, is_own: bool
+) -> FuzzySystem:
+    """Return a system whose numbers are joined as in an engine; note where it counts.
+
+    What a file of ours means its writer's page says.
+    """
+    outputs = {one.name: one for one in system.outputs}
+    for output, what, norm in joined_twice(system):
+        where = f"output {output.name!r}"
+        if dialect is not None:
+            aggregation = norm if dialect == "pyfuzzylite" else None
+            outputs[output.name] = replace(output, aggregation=aggregation)
+        elif is_own:
+            notes.remark(f"{where}: {what}")
+        else:
+            choice = "read it as fll:fuzzylite or fll:pyfuzzylite to choose"
+            notes.loss(where, f"{what}; {choice}")
+    return replace(system, outputs=tuple(outputs.values()))
 
 
 def _note_descriptions(sections: Sequence[FllSection], notes: ReaderNotes) -> None:
