@@ -112,7 +112,7 @@ def write(
                 "the decisions are exact: every term is 1 where it was, and less "
                 "elsewhere, so the same rule wins in every row"
             )
-        facts = FACTS + facts_of(rules, scores, always=always)
+        facts = FACTS + facts_of(model, scores, always=always)
     else:
         if scores != "rule":
             raise ValueError("scores: are of rules; a system has outputs of its own")

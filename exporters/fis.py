@@ -117,7 +117,7 @@ def write(
         system = as_system(rules, always="term")
         losses += [*cast_losses(model), *lost]
         remarks += cast_remarks(model)
-        comments.append(FACTS + facts_of(rules, always="term"))
+        comments.append(FACTS + facts_of(model, always="term"))
     else:
         refuse_singletons(model, "fis")
         system = model

@@ -112,7 +112,7 @@ def write(
         remarks += cast_remarks(model, scores)
         if model.kind != "relative":
             remarks.append("fuzzylite 6 treats a firing strength below 1e-6 as 0")
-        facts = FACTS + facts_of(rules, scores)
+        facts = FACTS + facts_of(model, scores)
     else:
         if scores != "winner":
             raise ValueError("scores: are of rules; a system has outputs of its own")

@@ -100,7 +100,7 @@ def write(
         system = as_system(rules, always="term")
         losses += [*cast_losses(model), *lost]
         remarks = [*cast_remarks(model), *remarks]
-        facts = facts_of(rules, always="term")
+        facts = facts_of(model, always="term")
     else:
         system = model
     system, lost = flattened(system)

@@ -487,10 +487,7 @@ def _proved(model: Document, form: Format, written: Written, *, dtype: object) -
             text = f"read back from the file, the {what} is equal in every number"
             return Proof("equal", text, _exact(model, text))
         case "alike":
-            text = (
-                "read back from the file, it is equal but for names and notes, "
-                "or lines that became points"
-            )
+            text = "read back from the file, it is equal but for names and notes"
             return Proof("alike", text)
         case "other" if written.losses or again.losses:
             text = "read back from the file, it differs by what was lost"

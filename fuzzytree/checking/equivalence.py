@@ -45,17 +45,13 @@ from fuzzytree.model import (
     fingerprint,
     joints,
     questions,
-    shapes_of,
 )
 from fuzzytree.semantics import (
-    EXACT,
     Scores,
     as_system,
-    degree,
-    landmarks,
+    band_of,
     shape_of,
     stepped,
-    straightened,
 )
 
 Likeness = Literal["equal", "alike", "renamed", "other"]
@@ -65,9 +61,8 @@ def equivalence(model: Document, written: Written, again: Reading) -> Likeness:
     """Return how what was read back stands to what was written.
 
     Returns:
-        `equal` in every number and name; `alike` but for names, notes and units, or
-        lines that became points, of which remarks were made; `renamed`, the same
-        without a remark; or `other`.
+        `equal` in every number and name; `alike` but for names, notes and units, of
+        which remarks were made; `renamed`, the same without a remark; or `other`.
     """
     if fingerprint(again.model) == fingerprint(model):
         return "equal"
@@ -79,15 +74,11 @@ def equivalence(model: Document, written: Written, again: Reading) -> Likeness:
 def is_equivalent(model: Document, other: Document) -> bool:
     """Return whether two models answer alike by their form, whatever they are called.
 
-    A rule base is like each of the systems that decide alike, and straight curves are
-    like the points that have their degrees to 2^-52.
+    A rule base is like each of the systems that decide alike, and a band is like the
+    points that stand for it in a file (`band_of`).
     """
     mark = _mark(other)
-    if any(_mark(one) == mark for one in _stand_ins(model)):
-        return True
-    if isinstance(model, RuleBase) and isinstance(other, RuleBase):
-        return _have_the_same_lines(model, other)
-    return False
+    return any(_mark(one) == mark for one in _stand_ins(model))
 
 
 def _mark(model: Document) -> str:
@@ -155,67 +146,11 @@ def _is_everywhere(curve: Curve) -> bool:
             return False
 
 
-def _have_the_same_lines(one: RuleBase, other: RuleBase) -> bool:
-    """Return whether two rule bases differ by nothing but how lines are written."""
-    first, second = canonical_form(one), canonical_form(other)
-    assert isinstance(first, RuleBase)  # it keeps the kind of a model
-    assert isinstance(second, RuleBase)
-    left, right = shapes_of(first.variables), shapes_of(second.variables)
-    if left.keys() != right.keys() or _bare(first) != _bare(second):
-        return False
-    return all(
-        shape == right[place] or _is_same_line(shape, right[place])
-        for place, shape in left.items()
-    )
-
-
-def _bare(rules: RuleBase) -> RuleBase:
-    variables = tuple(
-        replace(v, terms=tuple(Term(term.name, Band()) for term in v.terms))
-        for v in rules.variables
-    )
-    return replace(rules, variables=variables)
-
-
-def _is_same_line(one: Shape, other: Shape) -> bool:
-    """Return whether two polylines have the same degrees at every double, to 2^-52.
-
-    Between two neighbouring landmarks of either both are lines, so they are the same
-    where they agree at the doubles beside both landmarks. Where one is exactly 1 or 0,
-    the other is so too: decisions of relative rules hang on that.
-    """
-    if not (_is_polyline(one) and _is_polyline(other)):
-        return False
-    marks = {*landmarks(one), *landmarks(other), 0.0}
-    beside = {
-        value
-        for mark in marks
-        for far in (-math.inf, math.inf)
-        for near in (math.nextafter(mark, far),)
-        for value in (mark, near, math.nextafter(near, far))
-    }
-    pairs = [(degree(one, x), degree(other, x)) for x in beside if math.isfinite(x)]
-    return all(
-        abs(a - b) <= EXACT and (a == 1.0) == (b == 1.0) and (a == 0.0) == (b == 0.0)
-        for a, b in pairs
-    )
-
-
-def _is_polyline(shape: Shape) -> bool:
-    return isinstance(shape, Band | Points)
-
-
 def _stand_ins(model: Document) -> Iterator[Document]:
     """Yield what a file may hold in the place of a model, deciding alike."""
     yield model
-    if isinstance(model, FuzzySystem):
-        straight = straightened(model)
-        if straight is not None:
-            yield straight
     if isinstance(model, RuleBase):
-        for one in filter(None, (model, straightened(model))):
-            yield one
-            yield from _systems(one)
+        yield from _systems(model)
 
 
 def _systems(rules: RuleBase) -> Iterator[FuzzySystem]:
@@ -344,9 +279,17 @@ _OWN: Mapping[type[Document], tuple[str, ...]] = {
 
 
 def _shape(shape: Shape) -> Shape:
+    """Return one shape for all that have its degrees; a band for its points."""
     if isinstance(shape, Points):
-        return Points(stepped(shape.values), shape.degrees)
-    return shape
+        shape = Points(stepped(shape.values), shape.degrees)
+    band = band_of(shape) or shape
+    if not isinstance(band, Band):
+        return shape
+    if band.left is not None and math.nextafter(band.left, math.inf) == band.low:
+        band = replace(band, left=None)  # no double lies on the flank
+    if band.right is not None and math.nextafter(band.right, -math.inf) == band.high:
+        band = replace(band, right=None)
+    return band
 
 
 def _renamed_system(part: Any, names: _NewNames) -> Any:

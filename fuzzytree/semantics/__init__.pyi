@@ -4,14 +4,13 @@ from .conversion.facts import as_written as as_written
 from .conversion.facts import facts_of as facts_of
 from .conversion.facts import numbers_of as numbers_of
 from .conversion.facts import places_of as places_of
-from .conversion.points import EXACT as EXACT
+from .conversion.points import band_of as band_of
 from .conversion.points import check_tolerance as check_tolerance
 from .conversion.points import has_numbers as has_numbers
 from .conversion.points import pointed as pointed
 from .conversion.points import points_for as points_for
 from .conversion.points import shape_of as shape_of
 from .conversion.points import stepped as stepped
-from .conversion.points import straightened as straightened
 from .conversion.rule_forms import joined_by_number as joined_by_number
 from .conversion.rule_forms import joined_outputs as joined_outputs
 from .conversion.rule_forms import number_losses as number_losses

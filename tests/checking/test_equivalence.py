@@ -9,7 +9,6 @@ from msgspec.structs import replace
 
 from fuzzytree.checking.equivalence import equivalence, is_equivalent
 from fuzzytree.model import (
-    LR,
     Band,
     Document,
     FuzzySystem,
@@ -19,14 +18,13 @@ from fuzzytree.model import (
     Rule,
     RuleBase,
     Shape,
-    Side,
     Term,
     Trapezoid,
     Variable,
     Written,
 )
 from fuzzytree.semantics import as_system
-from fuzzytree.semantics.conversion.points import straightened
+from fuzzytree.semantics.conversion.points import straight_points
 from fuzzytree.semantics.samples import all_samples
 
 RULES = all_samples()["point lists"]
@@ -107,10 +105,9 @@ def test_rules_are_like_the_systems_that_decide_as_they_do(scores: str) -> None:
     assert not is_equivalent(other, as_system(RULES, "winner"))
 
 
-def test_straight_flanks_are_like_their_points() -> None:
-    points = straightened(RAMP)
-    assert points is not None
-    assert _seen(RAMP, points, "lines became points") == "alike"
+def test_a_band_is_like_its_points() -> None:
+    points = _one(straight_points(Band(high=2.0, right=4.0))[0])
+    assert _seen(RAMP, points, "a remark") == "alike"
     assert is_equivalent(points, RAMP)
 
 
@@ -135,8 +132,3 @@ def test_a_step_is_like_a_line_to_the_next_double() -> None:
 def test_another_curve_is_another_model(shape: Shape) -> None:
     assert not is_equivalent(RAMP, _one(shape))
     assert _seen(RAMP, _one(shape), "a remark") == "other"
-
-
-def test_a_curve_that_is_no_line_is_not_straightened() -> None:
-    assert straightened(_one(LR(2.0, Side(1.0, (0.5,)), Side(1.0, (0.5,))))) is None
-    assert straightened(_one(Points((0.0,), (1.0,)))) is None

@@ -14,7 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from fuzzytree.checking import export
+from fuzzytree.checking.converting import read_content
+from fuzzytree.checking.models import first_difference
 from fuzzytree.errors import LossError
+from fuzzytree.exporters import find_format
 from fuzzytree.model import (
     And,
     Band,
@@ -35,6 +39,7 @@ from fuzzytree.model import (
     Trapezoid,
     Variable,
 )
+from fuzzytree.numerics import BELOW_ONE
 from fuzzytree.semantics import (
     Always,
     Scores,
@@ -45,7 +50,7 @@ from fuzzytree.semantics import (
     facts_of,
     flattened,
 )
-from fuzzytree.semantics.conversion.points import shape_of
+from fuzzytree.semantics.conversion.points import band_of, shape_of, straight_points
 from fuzzytree.semantics.conversion.scores import winner
 from fuzzytree.semantics.inference import curve_degree, infer
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -442,3 +447,52 @@ def test_a_curve_that_is_a_shape_has_equal_bits(curve: Trapezoid | Singleton) ->
 def test_a_band_stays_a_band() -> None:
     band = Band(0.0, 1.0)
     assert shape_of(band) is band
+
+
+BANDS = [
+    Band(low, high, left, right)
+    for low, left in ((None, None), (1.0, None), (1.0, 0.3))
+    for high, right in ((None, None), (2.1, None), (2.1, 9.0))
+]
+NO_BANDS = [
+    Points((1.0, 1.0), (0.0, 1.0)),
+    Points((1.0, 2.1, 2.1, 3.0), (0.0, 1.0, BELOW_ONE, 0.0)),
+    Points((0.3, 1.0, 1.0), (0.0, BELOW_ONE, 1.0)),
+    Points((2.0,), (1.0,)),
+]
+
+
+@pytest.mark.parametrize("suffix", [".fcl", ".fll", ".fis", ".fml"])
+def test_bands_come_back_from_a_file_as_bands_and_points_as_points(suffix: str) -> None:
+    shapes = [*BANDS, *NO_BANDS]
+    terms = tuple(Term(f"t{k}", shape) for k, shape in enumerate(shapes))
+    rules = tuple(Rule((Proposition("x", (t.name,)),), "a") for t in terms)
+    base = RuleBase("m", ("a",), (Variable("x", terms),), rules)
+    content = export(base, suffix, allow_loss=True).content
+    again = read_content(content, find_format(suffix), name="m").model
+    assert isinstance(again, RuleBase)
+    assert first_difference(base, again) is None
+
+
+def test_points_that_somebody_moved_stay_points() -> None:
+    terms = (Term("low", Band(high=2.0, right=4.0)),)
+    rule = Rule((Proposition("x", ("low",)),), "a")
+    base = RuleBase("m", ("a",), (Variable("x", terms),), (rule,))
+    content = export(base, "fcl").content
+    moved = content.replace(b"(2.0, 0.9999999999999999)", b"(2.0, 0.99)")
+    assert moved != content
+    again = read_content(moved, find_format("fcl"), name="m").model
+    assert again.variables[0].terms[0].function == Points(
+        (2.0, 2.0, 4.0), (1.0, 0.99, 0.0)
+    )
+
+
+@pytest.mark.parametrize("band", BANDS, ids=str)
+def test_the_points_of_a_band_are_those_of_no_other(band: Band) -> None:
+    points, _ = straight_points(band)
+    assert band_of(points) == band
+    for place in range(len(points.values)):
+        degrees = [*points.degrees]
+        degrees[place] /= 2.0
+        other = Points(points.values, tuple(degrees))
+        assert other == points or band_of(other) is None

@@ -25,6 +25,7 @@ from fuzzytree.model import (
     Not,
     Or,
     Part,
+    Points,
     Probabilities,
     Proposition,
     Rule,
@@ -36,7 +37,7 @@ from fuzzytree.model import (
     Variable,
     questions,
 )
-from fuzzytree.semantics.conversion.points import shape_of
+from fuzzytree.semantics.conversion.points import band_of, shape_of, stepped
 from fuzzytree.semantics.conversion.scores import Always, Scores, as_system, flattened
 
 _UNSAFE = {character: f"\\u{ord(character):04x}" for character in "*/<>&#%'`$\x7f"}
@@ -48,7 +49,10 @@ _MOST = 4 * 2**20  # bytes of facts
 
 
 class _Named(Value, frozen=True):
-    """A variable without its curves."""
+    """A variable without its curves.
+
+    Points that a band would have are read as one, but for the terms in `points`.
+    """
 
     name: str
     terms: tuple[str, ...]
@@ -58,6 +62,7 @@ class _Named(Value, frozen=True):
     parts: tuple[Part, ...] = ()
     categories: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     missing: float | msgspec.UnsetType = msgspec.UNSET
+    points: tuple[int, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class _Facts(Value, frozen=True):
@@ -122,6 +127,8 @@ def facts_of(
                 v.parts,
                 v.categories or msgspec.UNSET,
                 msgspec.UNSET if v.missing is None else v.missing,
+                tuple(k for k, t in enumerate(v.terms) if band_of(t.shape))
+                or msgspec.UNSET,
             )
             for v in rules.variables
         ),
@@ -190,7 +197,30 @@ def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
         return None
     is_winner = result.scores == "winner"
     value, wanted = (_plain(one, has_default=is_winner) for one in (system, expected))
-    return rules if value == wanted else None
+    return _with_bands(rules, result) if value == wanted else None
+
+
+def _with_bands(rules: RuleBase, facts: _Facts) -> RuleBase:
+    """Return rules whose points are bands again where the facts do not object."""
+
+    def original(term: Term, *, is_points: bool) -> Term:
+        if isinstance(points := term.function, Points):
+            for shape in (points, Points(stepped(points.values), points.degrees)):
+                if band := band_of(shape):
+                    return replace(term, function=shape if is_points else band)
+        return term
+
+    variables = tuple(
+        replace(
+            variable,
+            terms=tuple(
+                original(term, is_points=k in (named.points or ()))
+                for k, term in enumerate(variable.terms)
+            ),
+        )
+        for variable, named in zip(rules.variables, facts.variables, strict=True)
+    )
+    return replace(rules, variables=variables)
 
 
 def as_written(

@@ -191,6 +191,13 @@ def straight_points(band: Band) -> tuple[Points, float]:
         >>> straight_points(Band(high=1.0, right=2.0))[0].values
         (1.0, 1.0, 2.0)
     """
+    points = _corners(band)
+    if math.isinf(points.values[-1] - points.values[0]):
+        raise LossError("it reaches beyond the largest double")
+    return points, 2.0**-53 if band.flanks else 0.0
+
+
+def _corners(band: Band) -> Points:
     points: list[tuple[float, float]] = []
     sides = (band.low, band.left, -1), (band.high, band.right, 1)
     for edge, end, sign in sides:
@@ -201,9 +208,28 @@ def straight_points(band: Band) -> tuple[Points, float]:
             half = [(end, 0.0), (edge, BELOW_ONE), (edge, 1.0)]
         points += half if sign < 0 else reversed(half)
     values, degrees = zip(*(points or [(0.0, 1.0)]), strict=True)
-    if math.isinf(values[-1] - values[0]):
-        raise LossError("it reaches beyond the largest double")
-    return Points(values, degrees), 2.0**-53 if band.flanks else 0.0
+    return Points(values, degrees)
+
+
+def band_of(shape: Shape) -> Band | None:
+    """Return the band that has exactly these points, as `straight_points` places them.
+
+    Example:
+        >>> band_of(straight_points(Band(high=1.0, right=2.0))[0])
+        Band(low=None, high=1.0, left=None, right=2.0)
+        >>> band_of(Points((0.0, 1.0), (0.0, 1.0))) is None
+        True
+    """
+    if not isinstance(shape, Points) or 1.0 not in shape.degrees:
+        return None
+    values, degrees = shape.values, shape.degrees
+    plateau = [v for v, d in zip(values, degrees, strict=True) if d == 1.0]
+    low = plateau[0] if degrees[0] == 0.0 else None
+    high = plateau[-1] if degrees[-1] == 0.0 else None
+    left = values[0] if low is not None and values[0] < low else None
+    right = values[-1] if high is not None and values[-1] > high else None
+    band = Band(low, high, left, right)
+    return band if _corners(band) == shape and not any(band.mistakes()) else None
 
 
 def _placed(curve: MembershipFunction, tolerance: float) -> PlacedPoints:
@@ -293,30 +319,3 @@ def _points_of(left: _Pairs, right: _Pairs) -> Points:
         right = right[1:]
     values, degrees = zip(*left, *right, strict=True)
     return Points(values, degrees)
-
-
-_COARSE = 0.01  # lines become the same points for every tolerance
-
-
-def _is_no_band(variable: Variable | SystemOutput, term: Term) -> bool:
-    return has_numbers(variable) or not isinstance(term.function, Band | LR)
-
-
-def straightened(model: D) -> D | None:
-    """Return a model whose bands are points, if that loses nothing.
-
-    The points are within 2^-52 of the degrees. Where another curve would be lost, or
-    there is nothing to change, it is None.
-
-    Example:
-        >>> from fuzzytree.model.rulebase import Rule, Term, Variable
-        >>> ramp = Term("low", Band(high=1.0, right=3.0))
-        >>> rules = RuleBase("a", ("x",), (Variable("p", (ramp,)),), (Rule((), "x"),))
-        >>> straightened(rules).variables[0].terms[0].shape.values
-        (1.0, 1.0, 3.0)
-    """
-    try:
-        result, losses = pointed(model, _COARSE, keeps=_is_no_band)
-    except LossError:
-        return None
-    return None if losses or result == model else result
