@@ -118,7 +118,11 @@ def audit_lines(
         states = [f"{n} {word}" for word, n in known_as(audit.answers).items() if n]
         count = counted(len(audit.answers), "question")
         yield f"{count}: {', '.join(states) or 'none'}"
-        missed = [text for text in audit.unasked if "left out by the user" not in text]
+        missed = [
+            text
+            for text in audit.unasked
+            if "left out by the user" not in text and ": not asked" not in text
+        ]
         if missed:
             yield f"not examined, or not to the end: {counted(len(missed), 'code')}"
         yield (

@@ -145,12 +145,6 @@ class Verified(NamedTuple):
 
 BY_HAND = (
     Verified(
-        "wine, plain features",
-        "rule 2 decides the same without 'flavanoids is high'",
-        "Rule 1, `flavanoids is low`, has the degree 1 wherever that is so, and stands "
-        "first: no rule behind it can win there, with or without saying it again.",
-    ),
-    Verified(
         "fuzzylite mamdani/AllTerms.fll",
         "term 'H' of 'AllInputTerms' has 2 peaks",
         "The file says `H Discrete 2 0 2.25 1 2.5 0.5 2.75 1 3 0`: the points go up, "

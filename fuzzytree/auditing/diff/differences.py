@@ -175,7 +175,7 @@ def difference(
         tuple(sorted(changes, key=lambda change: order[change.grade])),
         tuple(answers),
     )
-    return _proved_twice(result, both, Clock(settings.budget_s / 4))
+    return _proved_twice(result, both, clock)
 
 
 def _proved_twice(

@@ -16,6 +16,7 @@ from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Computed, Declined, Proved, counted
 from fuzzytree.auditing.findings.codes import (
+    ANSWERED_BY_CONSTRUCTION,
     AUDITED,
     CODES,
     FAMILIES,
@@ -55,6 +56,9 @@ from fuzzytree.model import (
 
 FamilyFunction = Callable[[Subject], Iterator[AuditAnswer]]
 
+_BY_CONSTRUCTION = "not asked where true by construction of relative rules"
+_OF_RAW_RULES = "FT203"
+_RAW = "not asked, as raw rules are another model; --select FT203 compares them"
 _OF_A_ROW = "FT204"
 _LATE = "FTD03"
 _TOO_LARGE = "it needs more memory than there is"
@@ -100,12 +104,18 @@ def audit(
     if row is not None:
         _check_row(row, model.inputs)
     viewed = view(model, domain or domain_of(model))
+    reasons: dict[str, str] = {}
+    if viewed.rules is not None and viewed.rules.kind == "relative":
+        reasons = dict.fromkeys(wanted & ANSWERED_BY_CONSTRUCTION, _BY_CONSTRUCTION)
+    if viewed.raw is not None and not selection.select:
+        reasons |= dict.fromkeys(wanted & {_OF_RAW_RULES}, _RAW)
     progress = _Progress([*viewed.declined], {})
+    clock = clock or Clock(settings.budget_s)
     if viewed.rules is not None:
-        clock = clock or Clock(settings.budget_s)
         facts = msgspec.structs.asdict(viewed)
         subject = Subject(**facts, settings=settings, clock=clock, rows=rows)
-        _run_all([*_tasks(wanted, row)], subject, clock, progress)
+        asked = {code for code in wanted if reasons.get(code) != _RAW}
+        _run_all([*_tasks(asked, row)], subject, clock, progress)
     answers = tuple(_located(progress.answers, wanted, viewed, material, repeat))
     result = Audit(
         version=version(),
@@ -119,7 +129,7 @@ def audit(
         domain=viewed.domain,
         settings=settings,
         answers=answers,
-        unasked=tuple(_unasked(viewed.policy, wanted, progress)),
+        unasked=tuple(_unasked(viewed.policy, wanted, progress, reasons)),
         limits=LIMITS,
         is_complete=not progress.cut,
         results=tuple(one.result for one in material.results),
@@ -127,10 +137,9 @@ def audit(
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
-    late = clock if clock and clock.is_over else Clock(settings.budget_s / 4)
     is_class = viewed.policy.decision == "strongest" and model is viewed.system
     whole = viewed.rules if is_class and viewed.rules is not None else model
-    result = _proved_twice(result, whole, late)
+    result = _proved_twice(result, whole, clock)
     ids = {one.id for one in result.findings}
     accepted = tuple(sorted(ids.intersection(selection.accepted)))
     result = msgspec.structs.replace(result, accepted=accepted)
@@ -304,7 +313,9 @@ def _reporter(clock: Clock, position: int, count: int) -> Callable[[str, float],
     return lambda text, share: clock.report(text, (position + share) / count)
 
 
-def _unasked(policy: Policy, wanted: set[str], progress: _Progress) -> Iterator[str]:
+def _unasked(
+    policy: Policy, wanted: set[str], progress: _Progress, reasons: Mapping[str, str]
+) -> Iterator[str]:
     """Yield which codes have no answer and why, in order."""
     answered = Counter(one.code for one in progress.answers)
     for code in sorted(AUDITED):
@@ -316,6 +327,8 @@ def _unasked(policy: Policy, wanted: set[str], progress: _Progress) -> Iterator[
             if answered[code]:
                 begun = f"cut short after {counted(answered[code], 'answer')}"
             yield f"{name}: {begun}: {progress.cut[code]}"
+        elif code in reasons:
+            yield f"{name}: {reasons[code]}"
         elif code in answered:
             continue
         elif policy.decision == "all" and CODES[code].decision == "strongest":

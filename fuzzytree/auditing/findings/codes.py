@@ -144,6 +144,10 @@ FAMILIES: Final = (
 """In the order of the audit: quick and severe questions first, so that a spent budget
 costs as little as it can."""
 
+ANSWERED_BY_CONSTRUCTION: Final = frozenset({"FT107", "FT201"})
+"""Of relative rules: beside each cut both sides reach nearly 1, and a rule shortened by
+a proposition ties with those before it."""
+
 AUDITED: Final = frozenset(code for family in FAMILIES for code in family.codes)
 """The codes that an audit answers; the others belong to `diff`, or are reasons for
 declining."""

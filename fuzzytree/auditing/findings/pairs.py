@@ -48,7 +48,8 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     if subject.policy.decision == "strongest":
         yield from _hidden(subject, compared, is_alike=False)
     yield from _copied(subject, compared)
-    yield from _conflicts(subject, compared)
+    if subject.rules.kind != "relative":
+        yield from _conflicts(subject, compared)
     if subject.policy.decision == "strongest":
         yield from proposition_answers(subject)
 

@@ -114,8 +114,18 @@ def proposition_answers(subject: Subject) -> Iterator[AuditAnswer]:
 
 
 def _dropped(rules: RuleBase) -> Iterator[_Dropped]:
+    """Yield the propositions; of relative rules those where only one class is left.
+
+    Below a node of several classes a rule that is shortened ties with all of them.
+    """
+    classes: dict[tuple[Proposition, ...], set[str]] = {}
+    for rule in rules.rules:
+        for place in range(len(rule.when)):
+            classes.setdefault(rule.when[:place], set()).add(rule.then)
     for number, rule in enumerate(rules.rules, 1):
         for place, proposition in enumerate(rule.when):
+            if rules.kind == "relative" and len(classes[rule.when[:place]]) > 1:
+                continue
             rest = (*rule.when[:place], *rule.when[place + 1 :])
             yield _Dropped(number, proposition, replace(rule, when=rest))
 

@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from sklearn import datasets
 
 import fuzzytree as ft
 from fuzzytree.api.verbs import audited_rows
@@ -29,11 +30,17 @@ from fuzzytree.auditing.findings.records import (
 from fuzzytree.auditing.findings.subject import AuditRows, Material
 from fuzzytree.errors import TableError
 from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
+from fuzzytree.model.tree import FuzzyTree, Leaf
 from fuzzytree.testing import random_system, random_tree
+from tests.auditing.findings.small_trees import one_cut, two_cuts
 from tests.cli.conftest import GRASPS, grip
 
 FAR = Domain((DomainSide("force", 3.0, 5.0), DomainSide("slip", 0.0, 1.0)))
 """Where the grip tree never reaches its first leaf."""
+
+
+UNIT = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
+WINE = Path(__file__).parents[3] / "examples" / "wine" / "wine.csv"
 
 
 @pytest.fixture
@@ -65,6 +72,49 @@ def test_each_code_is_answered_or_listed_as_not_run() -> None:
     results |= {text.split()[0] for text in found.unasked}
     assert results >= AUDITED
     assert found.is_complete
+
+
+@pytest.mark.parametrize("table", ["iris", "wine", "breast_cancer", "cultivars"])
+def test_nothing_that_fails_is_found_in_a_fresh_tree(table: str) -> None:
+    if table == "cultivars":
+        tree = ft.learn(WINE, target="cultivar")
+    else:
+        data = getattr(datasets, f"load_{table}")(as_frame=True)
+        names = data.target_names[data.target]
+        tree = ft.learn(data.data, target=names)
+    found = audit(Material(tree), selection=AuditSelection(ignore=["FT6"]))
+    assert [a.sentence for a in found.findings if a.severity != "info"] == []
+    assert not {a.code for a in found.answers} & {"FT201", "FT203"}
+    why = "not asked where true by construction of relative rules"
+    raw = "not asked, as raw rules are another model; --select FT203 compares them"
+    assert [text for text in found.unasked if ": not asked" in text] == [
+        f"FT107 irrelevant proposition: {why}",
+        f"FT201 conflict: {why}",
+        f"FT203 tree and raw rules differ: {raw}",
+    ]
+
+
+def test_the_raw_rules_of_a_tree_are_compared_on_request() -> None:
+    select = AuditSelection(select=["FT203"])
+    box = Domain((DomainSide("x", 0.0, 1.0),))
+    found = audit(Material(one_cut(0.6)), domain=box, selection=select)
+    assert {answer.code for answer in found.findings} == {"FT203"}
+
+
+@pytest.mark.parametrize(
+    ("tree", "codes"),
+    [
+        (two_cuts(0.7), {"FT404"}),
+        (two_cuts(0.3), {"FT101", "FT103", "FT404"}),  # no value reaches a leaf
+        (replace(two_cuts(0.7), leaves=tuple(map(Leaf, "abb"))), {"FT107", "FT404"}),
+        (replace(two_cuts(0.7), leaves=tuple(map(Leaf, "bbb"))), {"FT107", "FT404"}),
+    ],
+)
+def test_a_dead_leaf_and_a_node_without_a_choice_are_found_in_a_tree(
+    tree: FuzzyTree, codes: set[str]
+) -> None:
+    found = audit(Material(tree), domain=UNIT, selection=AuditSelection(ignore=["FT6"]))
+    assert {answer.code for answer in found.findings} == codes
 
 
 def test_every_code_belongs_to_one_table_or_another() -> None:
