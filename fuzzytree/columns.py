@@ -365,8 +365,9 @@ def placer(categories: Sequence[str]) -> Callable[[object], float | None]:
     def placed(value: object) -> float | None:
         if not _read(value, is_categorical=True)[0]:
             return math.nan
-        found = place.get(text_of(value))
-        number = number_of(value) if found is None else None
+        text = text_of(value)
+        found = place.get(text)
+        number = number_of(text) if found is None else None
         if number is not None and is_boolean:
             return number if number in (0.0, 1.0) else None
         if number is not None:

@@ -25,14 +25,13 @@ from fuzzytree.model import (
     DATE_UNIT,
     PARTS,
     FuzzyTree,
-    Variable,
     depth,
     label_type_of,
     with_label_type,
 )
 from fuzzytree.runtimes import baseline, class_probabilities
 from fuzzytree.semantics import Status, rules_from_tree
-from fuzzytree.tables import batches, read_table
+from fuzzytree.tables import TableSource, batches, read_table
 
 try:
     from scipy.sparse import csr_array
@@ -43,7 +42,9 @@ try:
     from sklearn.utils.multiclass import check_classification_targets
     from sklearn.utils.validation import (
         _num_samples,  # pyright: ignore[reportPrivateUsage]  # rows of any container
+        check_array,
         check_is_fitted,
+        check_X_y,
         validate_data,
     )
 except ImportError as error:
@@ -72,52 +73,46 @@ def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
     return validate_data(estimator, table, *map(_sound_labels, y), **options)
 
 
-def _as_numbers(
-    X: Any, variables: Sequence[Variable] | None = None
-) -> tuple[Any, dict[str, tuple[str, ...]], tuple[str, ...]]:
-    """Return a frame with numbers in the place of texts, truth values and dates.
+def _frame_of(X: Any) -> nw.DataFrame[Any] | None:
+    """Return a frame, None for anything else, or if two columns have one name."""
+    if type(X).__name__ == "RecordBatch":
+        import pyarrow as pa
 
-    Args:
-        X: A frame, or anything else, which comes back as it is.
-        variables: Those of the tree; None to learn what the columns are.
-
-    Returns:
-        The frame, and when learning the categories by column and the columns of dates.
-    """
+        X = pa.Table.from_batches([X])
     try:
         frame = nw.from_native(X, eager_only=True)
     except TypeError:
-        return X, {}, ()
-    if len(set(frame.columns)) < len(frame.columns):
-        return X, {}, ()
+        return None
+    return frame if len(set(frame.columns)) == len(frame.columns) else None
+
+
+def _as_numbers(
+    frame: nw.DataFrame[Any],
+) -> tuple[Any, dict[str, tuple[str, ...]], tuple[str, ...]]:
+    """Return a frame to learn from with numbers in the place of all other cells.
+
+    Returns:
+        The frame, the categories by column, and the columns of dates.
+    """
     types = zip(frame.columns, frame.schema.dtypes(), strict=True)
     names = [name for name, kind in types if not kind.is_numeric()]
     if not names:
-        return X, {}, ()
-    values = dict.fromkeys(map(str, names), np.zeros(len(frame)))
-    categories: dict[str, tuple[str, ...]] = {}
-    dates: tuple[str, ...] = ()
-    cells = frame.select(names).to_native()
-    if variables is None:
-        others = [name for name in frame.columns if name not in names]
-        some = frame.select([*names, *others[:1]]).to_native()  # all may be left out
-        table = read_table(some, target=np.zeros(len(frame)), name="X")
-        for column, text in table.remarks:
-            warnings.warn(f"X: {column} has {text}", stacklevel=3)
-        values |= dict(zip(table.columns, table.values, strict=True))
-        categories, dates = dict(table.categories), table.dates
-    else:
-        known = {v.name: v for v in variables if not v.parts}
-        used = [name for name in map(str, names) if name in known]
-        for batch in batches(cells, used, variables=[known[n] for n in used]):
-            values |= dict(zip(used, batch.values, strict=True))
+        return frame.to_native(), {}, ()
+    others = [name for name in frame.columns if name not in names]
+    some = frame.select([*names, *others[:1]]).to_native()  # all may be left out
+    table = read_table(some, target=np.zeros(len(frame)), name="X")
+    for column, text in table.remarks:
+        warnings.warn(f"X: {column} has {text}", stacklevel=3)
+    values = dict.fromkeys(names, np.zeros(len(frame)))
+    values |= dict(zip(table.columns, table.values, strict=True))
     numbers = [
-        nw.new_series(name, values[str(name)], nw.Float64, backend=frame.implementation)
+        nw.new_series(name, values[name], nw.Float64, backend=frame.implementation)
         for name in names
     ]
-    if hasattr(X, "index"):  # of pandas, which aligns columns by it
-        numbers = [nw.maybe_set_index(one, index=X.index) for one in numbers]
-    return frame.with_columns(*numbers).to_native(), categories, dates
+    if hasattr(some, "index"):  # of pandas, which aligns columns by it
+        numbers = [nw.maybe_set_index(one, index=some.index) for one in numbers]
+    converted = frame.with_columns(*numbers).to_native()
+    return converted, dict(table.categories), table.dates
 
 
 def _sound_labels(y: Any) -> Any:
@@ -270,10 +265,16 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 kept = np.flatnonzero(weights)
                 rows = [_safe_indexing(part, kept) for part in rows]
                 weights = weights[kept]
-        table, categories, dates = _as_numbers(rows[0])
-        values, labels = _validated(
-            self, table, rows[1], dtype=np.float64, ensure_all_finite=self._finite()
-        )
+        options = {"dtype": np.float64, "ensure_all_finite": self._finite()}
+        categories: dict[str, tuple[str, ...]] = {}
+        dates: tuple[str, ...] = ()
+        frame = _frame_of(rows[0])
+        if frame is None:
+            values, labels = _validated(self, *rows, **options)
+        else:
+            _validated(self, *rows, skip_check_array=True)
+            table, categories, dates = _as_numbers(self._renamed(frame))
+            values, labels = check_X_y(table, rows[1], estimator=self, **options)
         check_classification_targets(labels)
         if len(values) == 1:
             raise ValueError("cannot learn from one sample (n_samples = 1)")
@@ -315,6 +316,13 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 "a pickled or copied classifier holds no training rows, so partial_fit "
                 "cannot continue; call fit, or partial_fit on the original"
             )
+        frame = _frame_of(X)
+        for name, kind in frame.schema.items() if frame else ():
+            if kind in (nw.String, nw.Categorical, nw.Enum):
+                raise ValueError(
+                    f"X: column {name!r} holds texts, whose categories only all rows "
+                    "show: call fit, or learn from parts with fuzzytree.Learner"
+                )
         values, labels = _validated(
             self,
             X,
@@ -554,15 +562,29 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             return [f"x{number}" for number in range(1, self.n_features_in_ + 1)]
         return [str(name) for name in names]
 
+    def _renamed(self, frame: nw.DataFrame[Any]) -> nw.DataFrame[Any]:
+        """Return a frame whose columns have the names of the tree's."""
+        names = self._columns()
+        if frame.columns == names:
+            return frame
+        return frame.rename(dict(zip(frame.columns, names, strict=True)))
+
     def _values(self, X: npt.ArrayLike) -> FloatArray:
         """Return the columns that the tree needs, shape (inputs, rows)."""
         check_is_fitted(self)
-        table, _, _ = _as_numbers(X, self.tree_.variables)
-        values: FloatArray = _validated(
-            self, table, reset=False, dtype=np.float64, ensure_all_finite=self._finite()
-        )
-        position = {name: k for k, name in enumerate(self._columns())}
-        return values.T[[position[name] for name in self.tree_.inputs]]
+        options = {"dtype": np.float64, "ensure_all_finite": self._finite()}
+        frame = _frame_of(X)
+        if frame is None:
+            values = _validated(self, X, reset=False, **options)
+            rows = TableSource(values, self._columns())
+        else:
+            _validated(self, X, reset=False, skip_check_array=True)
+            rows = self._renamed(frame).to_native()
+        variables = self.tree_.variables
+        [part] = batches(rows, self.tree_.inputs, variables=variables, name="X")
+        if frame is not None:
+            check_array(part.values.T, ensure_min_features=0, input_name="X", **options)
+        return part.values
 
     def _answers(self, values: FloatArray, representation: ModelKind) -> Outcome:
         outcome = self._run(representation)(values)

@@ -122,6 +122,7 @@ _EMPTY = sorted({way(text) for text in MISSING for way in (str, str.upper, str.t
 _MISSING = f"(?i)^(?:{'|'.join(sorted(MISSING))})$"
 _DELIMITERS = (",", ";", "\t")
 _ARROW, _PARQUET = b"ARROW1", b"PAR1"
+_ARROW_TEXTS = ("string", "large_string", "string_view")
 _NO_DELIMITER = '"\r\n\0'
 
 
@@ -141,6 +142,8 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
         whole: All cells as one array of shape (columns, rows), where they are one.
         frame: The rows as a table of pyarrow, of a Parquet or Arrow file.
         share: How much of the bytes of all files was read by then; 0 if unknown.
+        texts: The columns whose type is text or category: to learn from, all their
+            cells are texts, whatever these look like.
     """
 
     name: str
@@ -153,6 +156,7 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
     whole: FloatArray | None = None
     frame: object = None
     share: float = 0.0
+    texts: frozenset[str] = frozenset()
 
 
 class Table(msgspec.Struct, frozen=True, eq=False):
@@ -331,7 +335,7 @@ class LearningRows:
 
     Args:
         chosen: The columns to learn from, if other parts of the table have set them.
-        chosen_by: What has set them, for messages.
+        variables: Those of a model, if the columns are read for it.
         labels: The classes so far; more are added.
         progress: Called with the number of rows so far, and the share that is read.
 
@@ -359,7 +363,7 @@ class LearningRows:
         ignore: Sequence[str] = (),
         name: str | None = None,
         chosen: Sequence[str] | None = None,
-        chosen_by: str = "other parts have",
+        variables: Sequence[Variable] = (),
         labels: ClassLabels | None = None,
         progress: Callable[[str, float], None] | None = None,
     ) -> None:
@@ -371,7 +375,7 @@ class LearningRows:
             )
         self.target = target.strip() if isinstance(target, str) else ""
         self.names = None if chosen is None else tuple(chosen)
-        self._chosen_by = chosen_by
+        self._variables = variables
         self.labels = labels or ClassLabels()
         self.name = name or path_of(source) or ""
         self.rows = self.unlabelled = self.weightless = self.missing = 0
@@ -404,15 +408,22 @@ class LearningRows:
         chosen = self._chosen(first)
         is_kept = np.array([k not in self._counts for k in chosen], bool)
         names = [first.columns[k] for k in chosen]
-        if self._chosen_by == "other parts have":
-            _refuse_absent(first, sorted(self.categorical), "")
+        _refuse_absent(first, sorted(self.categorical), "")
 
         def read(
             piece: TablePiece,
         ) -> tuple[
             TablePiece, FloatArray, list[_Column], FloatArray | None, _Coded | None
         ]:
-            numbers = _codes_of(piece, chosen, names, self.categorical)
+            if self._variables:
+                values, _ = _numbers_of(piece, chosen, self._variables)
+                numbers = (
+                    values,
+                    [(Contents(), dict[str, tuple[int, str]]())] * len(chosen),
+                )
+            else:
+                texts = self.categorical | piece.texts
+                numbers = _codes_of(piece, chosen, names, texts)
             weights = (
                 None if self._weight is None else _row_weights(piece, self._weight)
             )
@@ -542,7 +553,8 @@ class LearningRows:
             )
         if self.names is not None:
             _refuse_absent(first, [self.target], "")
-            _refuse_absent(first, self.names, f", which {self._chosen_by}")
+            by = "the model needs" if self._variables else "other parts have"
+            _refuse_absent(first, self.names, f", which {by}")
             return [first.columns.index(column) for column in self.names]
         others = [self.target] if self._codes is None else []
         others += [] if self._weight is None else [self._weight]
@@ -602,16 +614,13 @@ def batches(
     inputs, trained = ([c.strip() for c in names] for names in (inputs, trained))
     _refuse_repeated("the model", inputs)
     known = {one.name.strip(): one for one in variables}
-    categories = {name: one.categories for name, one in known.items() if one.categories}
-    dates = {name for name, one in known.items() if one.unit == DATE_UNIT}
+    wanted = [known.get(name) or Variable(name) for name in inputs]
     only = None if with_others else frozenset(inputs)
     chosen: list[int] | None = None
     for piece in pieces(source, name=name, only=only):
         if chosen is None:
             chosen = _needed_columns(piece, inputs, trained)
-        values, faults, unknown = _numbers_of(piece, chosen, inputs, categories, dates)
-        if faults:
-            raise TableError(_fault_text(faults))
+        values, unknown = _numbers_of(piece, chosen, wanted)
         extras = len(piece.columns) - len(chosen)
         missing = _missing_cells(values) - sum(unknown.values())
         yield Batch(values, missing, extras, piece, unknown)
@@ -914,6 +923,8 @@ def columns_of(
                 f"{count} different texts in {held.text:,} rows, as an identifier has"
             )
             hint = f"; --categorical {_quoted(name)} keeps it" if held.texts else ""
+            if held.texts and all(number_of(one) is not None for one in held.texts):
+                hint += ", or convert it to numbers"
             remarks.append((name, f"{text}; it is left out{hint}"))
             continue
         elif kind in ("text", "boolean"):
@@ -935,7 +946,8 @@ def columns_of(
         raise TableError("\n".join(shown) + "\n  " + text.format(*hints))
     chosen = tuple(names[place] for place in kept)
     if not chosen:
-        raise TableError(f"{table} has no column to learn from")
+        whys = "".join(f"\n  {name}: {text}" for name, text in remarks[:_MOST_NAMES])
+        raise TableError(f"{table} has no column to learn from{whys}")
     return LearntColumns(chosen, tuple(kept), categories, tuple(dates), tuple(remarks))
 
 
@@ -1015,32 +1027,38 @@ def _all_numbers(piece: TablePiece, chosen: Sequence[int]) -> FloatArray | None:
 
 
 def _numbers_of(
-    piece: TablePiece,
-    chosen: Sequence[int],
-    names: Sequence[str],
-    categories: Mapping[str, Sequence[str]],
-    dates: Collection[str],
-) -> tuple[FloatArray, _Faults, dict[str, int]]:
-    """Return columns of a piece as numbers, the cells of text, and unknown categories.
+    piece: TablePiece, chosen: Sequence[int], variables: Sequence[Variable]
+) -> tuple[FloatArray, dict[str, int]]:
+    """Return columns of a piece as the variables of a model take them.
 
-    Cells of a column with categories become their positions.
+    Every reader of rows for a model uses it. The variable decides, whatever type the
+    column has: a cell of one with categories is the position of its category, of dates
+    its days, and any other a number.
+
+    Returns:
+        Shape (columns, rows), NaN where a cell is missing or no category; and by name,
+        how many cells are no category.
+
+    Raises:
+        TableError: If a column of numbers holds text; all such columns are named.
     """
-    numbers = None if categories else _all_numbers(piece, chosen)
+    is_plain = not any(one.categories for one in variables)
+    numbers = _all_numbers(piece, chosen) if is_plain else None
     if numbers is not None:
-        return numbers, {}, {}
-    columns = [piece.cells[index] for index in chosen]
+        return numbers, {}
     unknown: dict[str, int] = {}
-    values, faults = np.empty((len(columns), piece.rows)), _Faults()
-    for row, (cells, name) in enumerate(zip(columns, names, strict=True)):
-        if name in categories:
+    values, faults = np.empty((len(chosen), piece.rows)), _Faults()
+    for row, (index, variable) in enumerate(zip(chosen, variables, strict=True)):
+        cells, name = piece.cells[index], variable.name.strip()
+        if variable.categories:
             indices, distinct = distinct_values(cells)
-            found = [*map(placer(categories[name]), distinct)]
+            found = [*map(placer(variable.categories), distinct)]
             is_new = np.array([one is None for one in found], np.bool_)
             places = np.array([math.nan if one is None else one for one in found])
             values[row] = places[indices]
             unknown[name] = int(np.count_nonzero(is_new[indices]))
             continue
-        if name in dates:
+        if variable.unit == DATE_UNIT:
             values[row], contents, _ = coded(cells)
             if contents.kind() in ("date", "number"):
                 continue
@@ -1049,7 +1067,9 @@ def _numbers_of(
         values[row], bad = _numbers(cells)
         if bad:
             faults[name] = piece.where(bad[0]), str(cells[bad[0]]), len(bad)
-    return values, faults, {name: n for name, n in unknown.items() if n}
+    if faults:
+        raise TableError(_fault_text(faults))
+    return values, {name: n for name, n in unknown.items() if n}
 
 
 def _fault_text(faults: _Faults) -> str:
@@ -1393,6 +1413,7 @@ def _batch_pieces(
         titles = written or tuple(table.column_names)
         columns = _named(name, titles)
         cells: list[Cells] = [()] * len(columns)
+        texts: set[str] = set()
         places = {title: place for place, title in enumerate(titles)}
         for title, data in zip(table.column_names, table.columns, strict=True):
             place = places[title]
@@ -1400,9 +1421,19 @@ def _batch_pieces(
                 kind = data.type
                 is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
                 cells[place] = number_array(data) if is_number else data.to_pylist()
-        where, count = _row_names(name, first), table.num_rows
-        yield TablePiece(name, columns, (*cells,), count, where, titles, frame=table)
-        first += count
+                if pa.types.is_dictionary(kind) or str(kind) in _ARROW_TEXTS:
+                    texts.add(columns[place])
+        yield TablePiece(
+            name,
+            columns,
+            (*cells,),
+            table.num_rows,
+            _row_names(name, first),
+            titles,
+            frame=table,
+            texts=frozenset(texts),
+        )
+        first += table.num_rows
 
 
 def _record_batches(
@@ -1604,15 +1635,26 @@ def _frame_piece(source: object, name: str, only: Only = None) -> TablePiece:
     columns = _named(name, written)
     there = dict(zip(map(str, frame.columns), frame.columns, strict=True))
     cells: list[Cells] = []
+    texts: set[str] = set()
     for title, column in zip(written, columns, strict=True):
         if title not in there or not (only is None or column in only):
             cells.append(())
             continue
         series = frame.get_column(there[title])
-        is_array = series.dtype.is_numeric() or series.dtype == nw.Datetime
+        kind = series.dtype
+        is_array = kind.is_numeric() or kind == nw.Datetime
         cells.append(series.to_numpy() if is_array else series.to_list())
+        if kind in (nw.String, nw.Categorical, nw.Enum):
+            native = getattr(series.to_native(), "dtype", None)
+            texts |= {column} if str(native) != "object" else set()
     return TablePiece(
-        name, columns, tuple(cells), len(frame), _row_names(name), written
+        name,
+        columns,
+        tuple(cells),
+        len(frame),
+        _row_names(name),
+        written,
+        texts=frozenset(texts),
     )
 
 

@@ -14,6 +14,7 @@ import joblib  # type: ignore[import-untyped]  # it has no types of its own
 import msgspec
 import numpy as np
 import pandas as pd
+import polars as pl
 import pytest
 from numpy.testing import assert_allclose
 from sklearn import config_context
@@ -296,6 +297,46 @@ def test_a_frame_may_have_texts_dates_and_missing_values() -> None:
     assert ft.run(model.tree_, table).classes == found
     table["island"] = "Mars"
     assert len(model.predict(table)) == rows
+
+
+def test_a_category_may_be_a_number_at_prediction() -> None:
+    rows = pd.DataFrame({"z": [10115, 20095, 80331, "unk"] * 30})
+    model = FuzzyTreeClassifier().fit(rows, list("nnss") * 30)
+    zips = [10115, 20095, 80331]
+    expected = model.predict_proba(rows[:3])
+    for table in (
+        pd.DataFrame({"z": zips}),
+        pd.DataFrame({"z": zips}, dtype=float),
+        pd.DataFrame({"z": pd.Categorical(zips)}),
+        pd.DataFrame({"z": pd.array(zips, "Int64")}),
+        pl.DataFrame({"z": list(map(str, zips))}),
+    ):
+        assert model.predict(table).tolist() == [*"nns"]
+        assert ft.run(model.tree_, table).classes == [*"nns"]
+        assert model.apply(table).tolist() == model.apply(rows[:3]).tolist()
+        assert (model.predict_proba(table) == expected).all()
+        paths = model.decision_path(table).toarray()
+        assert (paths == model.decision_path(rows[:3]).toarray()).all()
+    with pytest.warns(UserWarning, match="valid feature names"):
+        assert model.predict(np.array([zips]).T).tolist() == [*"nns"]
+
+
+@pytest.mark.parametrize("names", [["a", "b"], [0, 1]], ids=["texts", "numbers"])
+def test_columns_of_text_may_have_numbers_as_names(names: list[Any]) -> None:
+    table = pd.DataFrame({names[0]: [0.5] * 40, names[1]: [*"pq"] * 20})
+    model = FuzzyTreeClassifier().fit(table, [*"xy"] * 20)
+    assert model.tree_.variables[0].categories == ("p", "q")
+    assert model.predict(table[:4]).tolist() == [*"xyxy"]
+
+
+def test_partial_fit_refuses_texts() -> None:
+    table = pd.DataFrame({"z": pd.Categorical([1, 2, 1, 2])})
+    with pytest.raises(ValueError, match="categories") as caught:
+        FuzzyTreeClassifier().partial_fit(table, [*"abab"], classes=["a", "b"])
+    assert str(caught.value) == (
+        "X: column 'z' holds texts, whose categories only all rows show: call fit, or "
+        "learn from parts with fuzzytree.Learner"
+    )
 
 
 def test_a_column_that_is_left_out_is_named() -> None:

@@ -9,6 +9,7 @@ import random
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,6 +19,7 @@ import pyarrow.parquet as pq
 import pytest
 from pyarrow import csv
 
+import fuzzytree as ft
 from fuzzytree import csv_rows, tables
 from fuzzytree.cells import plain
 from fuzzytree.errors import TableError
@@ -567,6 +569,63 @@ def test_chunks_with_nulls_are_missing_cells() -> None:
     assert str(_values(pa.table({"a": column}), ["a"])) == "[[1.0, nan, 3.0]]"
     frame = pd.DataFrame({"a": pd.array([1.5, None], dtype="double[pyarrow]")})
     assert str(_values(frame, ["a"])) == "[[1.5, nan]]"
+
+
+_ZIPS = [k % 40 for k in range(160)]
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        pd.Categorical(_ZIPS),
+        pd.Categorical(_ZIPS, ordered=True),
+        pd.array([*map(str, _ZIPS)], "string"),
+        pl.Series([*map(str, _ZIPS)], dtype=pl.Categorical),
+        pl.Series([*map(str, _ZIPS)], dtype=pl.Enum([*map(str, range(40))])),
+        pl.Series([*map(str, _ZIPS)]),
+        pa.array(_ZIPS).dictionary_encode(),
+        pa.array([*map(str, _ZIPS)], pa.large_string()),
+    ],
+    ids=lambda column: str(getattr(column, "dtype", getattr(column, "type", "")))[:30],
+)
+def test_a_column_of_texts_or_categories_stays_one_whatever_it_looks_like(
+    column: Any,
+) -> None:
+    make = {"pandas": pd.DataFrame, "polars": pl.DataFrame}.get(
+        type(column).__module__.split(".")[0], pa.table
+    )
+    tree = ft.learn(make({"z": column}), target=[k % 2 for k in _ZIPS])
+    assert tree.variables[0].categories == tuple(map(str, range(40)))
+    assert len(tree.leaves) == 2
+
+
+def test_digits_of_an_identifier_are_refused_with_what_makes_them_numbers() -> None:
+    frame = pl.DataFrame({"z": [*map(str, range(40))]})
+    with pytest.raises(TableError) as caught:
+        read_table(frame, target=_ZIPS[:40])
+    assert str(caught.value) == (
+        "the table has no column to learn from\n"
+        "  z: 40 different texts in 40 rows, as an identifier has; it is left out; "
+        "--categorical z keeps it, or convert it to numbers"
+    )
+
+
+def test_objects_of_pandas_are_what_their_cells_look_like() -> None:
+    cells = pd.Series([*map(str, _ZIPS)], dtype=object)
+    table = read_table(pd.DataFrame({"z": cells}), target=_ZIPS)
+    assert (table.categories, table.values.tolist()) == ({}, [_ZIPS])
+
+
+def test_nullable_numbers_and_truth_values_keep_their_kind() -> None:
+    frame = pd.DataFrame(
+        {
+            "a": pd.array([1, None, 3], "Int64"),
+            "b": pd.array([True, None, False], "boolean"),
+        }
+    )
+    table = read_table(frame, target=[*"xyx"])
+    assert str(table.values.tolist()) == "[[1.0, nan, 3.0], [1.0, nan, 0.0]]"
+    assert (table.categories, table.missing) == ({"b": ("False", "True")}, 2)
 
 
 @pytest.mark.parametrize(

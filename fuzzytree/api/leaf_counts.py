@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.checking import as_model
-from fuzzytree.columns import positions
 from fuzzytree.errors import ReadError
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning import (
@@ -96,20 +95,14 @@ class LeafCounts:
             target=self.target,
             name=name,
             chosen=self.tree.inputs,
-            chosen_by="the model needs",
+            variables=[one for one in self.tree.variables if not one.parts],
             labels=part._labels,
             progress=progress,
         )
         execute, missing = baseline().load(self.tree), len(self.tree.leaves) + 1
 
-        inputs = [one for one in self.tree.variables if not one.parts]
-
         def predict(piece: LearningPiece) -> tuple[IntArray, IntArray, int]:
-            rows = [
-                positions(row, one.categories) if one.categories else row
-                for one, row in zip(inputs, piece.values, strict=True)
-            ]
-            outcome = execute(np.array(rows).reshape(piece.values.shape))
+            outcome = execute(piece.values)
             is_missing = outcome.status == Status.MISSING
             ends = np.where(is_missing, missing, outcome.rule).astype(np.int64)
             ties = int(np.count_nonzero(outcome.status == Status.TIE))

@@ -120,6 +120,9 @@ def test_a_part_with_a_fault_leaves_the_counts_as_they_were(
         counts.update(table.drop(columns="a"), name="part 3")
     with pytest.raises(TableError, match=r"^part 4 has no column 'kind'; it has a, b"):
         counts.update(table.drop(columns="kind"), name="part 4")
+    text = r"^part 5, row 1: column '\w' holds text where a number is needed: 'x'"
+    with pytest.raises(TableError, match=text):
+        counts.update(table.assign(a="x", b="x", c="x"), name="part 5")
     assert counts.rows == ROWS
 
 

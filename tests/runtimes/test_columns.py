@@ -8,9 +8,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import duckdb
+import narwhals as nw
 import numpy as np
 import pandas as pd
 import polars as pl
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from msgspec.structs import replace
 
@@ -18,7 +21,18 @@ import fuzzytree as ft
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.exporters import sql, yaml
 from fuzzytree.formats import read_yaml
-from fuzzytree.model import FuzzyTree, Part, RuleBase, Variable, fingerprint
+from fuzzytree.model import (
+    Band,
+    Branch,
+    FuzzyTree,
+    Leaf,
+    Node,
+    Part,
+    RuleBase,
+    Term,
+    Variable,
+    fingerprint,
+)
 from fuzzytree.numerics import decide, exact_answer, strength_bounds
 from fuzzytree.runtimes import native
 from fuzzytree.semantics import (
@@ -124,6 +138,46 @@ def test_an_onnx_file_and_engines_take_the_texts_of_a_table(tmp_path: Path) -> N
     assert lazy["class"].to_list() == expected
 
 
+@pytest.mark.parametrize(
+    ("kind", "cells"),
+    [
+        ("DOUBLE", [1.0, 2.5, 17.0, math.inf, math.nan, None]),
+        ("DECIMAL(10, 2)", [1, 2.5, 0, None]),
+        ("BOOLEAN", [True, False, None]),
+        ("VARCHAR", ["1.0", " x", "017", "0.50", "true", "yes", "0", "", None]),
+        ("ENUM ('1', 'true', 'x')", ["1", "true", "x", None]),
+    ],
+)
+@pytest.mark.parametrize(
+    "categories", [("False", "True"), ("0.5", "017", "1", "2.5", "True", "x")], ids=len
+)
+def test_a_query_finds_the_categories_that_run_finds(
+    kind: str, cells: list[object], categories: tuple[str, ...]
+) -> None:
+    names = tuple(f"c{k}" for k in range(len(categories)))
+    places = [k + 0.5 for k in range(len(categories) - 1)]
+    edges = [None, *places, None]
+    terms = tuple(
+        Term(name, Band(low=low, high=high))
+        for name, low, high in zip(names, edges[:-1], edges[1:], strict=True)
+    )
+    ways = tuple(Branch((name,), leaf=k) for k, name in enumerate(names, 1))
+    tree = FuzzyTree(
+        "t",
+        names,
+        (Variable("z", terms, categories=categories),),
+        (Node("z", tuple(places), tuple(range(len(names))), ways),),
+        tuple(map(Leaf, names)),
+    )
+    with duckdb.connect() as connection:
+        connection.execute(f"CREATE TABLE t (z {kind})")
+        connection.executemany("INSERT INTO t VALUES (?)", [[cell] for cell in cells])
+        rows = connection.table("t")
+        expected = ft.run(tree, rows.to_arrow_table()).rule.tolist()
+        found = ft.predict(rows, tree).fetchall()
+    assert [row[2] for row in found] == expected
+
+
 @pytest.mark.parametrize("dialect", ["duckdb", "sqlite"])
 def test_sql_compares_texts(dialect: Literal["duckdb", "sqlite"]) -> None:
     cells = [("Biscoe", 1.0), ("Dream", 3.0), ("Mars", 1.0), (None, None)]
@@ -142,3 +196,106 @@ def test_every_representation_agrees_on_missing_and_unknown_cells() -> None:
     assert report.ok
     examined = {one.representation for one in report.comparisons}
     assert {"c", "native", "onnxruntime"} <= {one.split()[0] for one in examined}
+
+
+# --- the same table in many containers
+
+
+def _typed_table(seed: int) -> pd.DataFrame:
+    """Return a table whose types say more than the look of its cells."""
+    rng = np.random.default_rng(seed)
+    zips, masses = rng.integers(0, 9, 60), rng.normal(size=60)
+    masses[:6] = math.nan, math.nan, math.nan, 1e300, 0.0, -0.0
+    counts = [None if k % 11 == 0 else k for k in rng.integers(0, 50, 60).tolist()]
+    flags = [None if k % 13 == 0 else k % 2 == 0 for k in counts if k is not None]
+    flags += [None] * (60 - len(flags))
+    is_even = (zips % 2 == 0) ^ (masses > 0.5)
+    return pd.DataFrame(
+        {
+            "zip": pd.Categorical(zips, ordered=bool(seed % 2)),
+            "code": pd.array(
+                rng.choice(["7", "007", "1e1", "x"], 60).tolist(), "string"
+            ),
+            "flag": pd.array(flags, "boolean"),
+            "count": pd.array(counts, "Int64"),
+            "mass": masses,
+            "kind": np.where(is_even, "even", "odd").tolist(),
+        }
+    )
+
+
+def _containers(frame: pd.DataFrame, folder: Path) -> dict[str, Any]:
+    """Return a table in everything that `learn` and `run` take."""
+    texts = frame.astype({"zip": "str"})
+    polars = pl.from_pandas(texts).with_columns(
+        pl.col("zip").cast(pl.Enum([str(k) for k in range(9)]))
+    )
+    arrow = pa.Table.from_pandas(frame, preserve_index=False)
+    pq.write_table(polars.to_arrow(), folder / "t.parquet")
+    frame.to_csv(folder / "t.csv", index=False)
+    objects = frame.astype(object).to_numpy()
+    declared = ["zip", "code"]
+    names = ", ".join(f"'{k}'" for k in range(9))
+    relation = duckdb.from_arrow(pa.Table.from_pandas(texts)).project(
+        f"zip::ENUM({names}) AS zip, * EXCLUDE zip"
+    )
+    return {
+        "pandas": frame,
+        "pandas of arrow": frame.convert_dtypes(dtype_backend="pyarrow"),
+        "polars": polars,
+        "lazy polars": polars.lazy(),
+        "polars categories": polars.with_columns(pl.col("zip").cast(pl.Categorical)),
+        "arrow": arrow,
+        "batch": arrow.to_batches()[0],
+        "parquet": folder / "t.parquet",
+        "duckdb": relation,
+        "csv": ft.table(folder / "t.csv", categorical=declared),
+        "array": ft.table(objects, columns=[*frame.columns], categorical=declared),
+    }
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.filterwarnings("ignore:.*has a category that occurs once")
+def test_a_table_has_one_tree_and_one_answer_in_every_container(
+    seed: int, tmp_path: Path
+) -> None:
+    frame = _typed_table(seed)
+    tables = _containers(frame, tmp_path)
+    few = ft.LearningSettings(columns=1, leaves=4)
+    trees = {
+        name: ft.learn(table, target="kind", name="t", settings=few)
+        for name, table in tables.items()
+    }
+    tree = trees["pandas"]
+    assert {name for name, one in trees.items() if one != tree} == set()
+    assert tuple(map(str, range(9))) in {one.categories for one in tree.variables}
+
+    (tmp_path / "t.onnx").write_bytes(ft.export(tree, "onnx").content)
+    expected = ft.run(tree, frame, with_probabilities=True)
+    assert expected.probabilities is not None
+    rules, classes = expected.rule.tolist(), expected.classes
+    counts = ft.LeafCounts(tree, "kind")
+    counts.update(frame)
+    for name, table in tables.items():
+        if name == "duckdb":
+            assert ft.predict(tables[name], tree).fetchnumpy()["rule"].tolist() == rules
+            continue
+        for model in (tree, tmp_path / "t.onnx"):
+            found = ft.run(model, table)
+            assert isinstance(found, ft.Predictions)
+            assert (found.rule.tolist(), found.classes) == (rules, classes), name
+        others = ft.LeafCounts(tree, "kind")
+        others.update(table)
+        assert others.confusion() == counts.confusion(), name
+    lazy = ft.predict(tables["lazy polars"], tree).collect()
+    assert lazy["rule"].to_list() == rules
+
+    for name in ("pandas", "pandas of arrow", "polars", "arrow"):
+        cells = nw.from_native(tables[name], eager_only=True).drop("kind").to_native()
+        model = ft.FuzzyTreeClassifier(columns=1, leaves=4).fit(cells, frame["kind"])
+        assert model.tree_ == replace(tree, name="tree"), name
+        assert model.predict(cells).tolist() == classes
+        assert model.apply(cells).tolist() == rules
+        assert np.array_equal(model.predict_proba(cells).T, expected.probabilities)
+        ends = model.decision_path(cells).toarray()[:, len(tree.nodes) :].argmax(axis=1)
+        assert (ends + 1).tolist() == rules

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, cast
 
+from fuzzytree.cells import number_of
 from fuzzytree.checking import export
 from fuzzytree.columns import BOOLEANS
 from fuzzytree.errors import TableError
@@ -113,14 +114,9 @@ def _input(cell: str, title: str, is_long: bool | None, variable: Variable) -> s
     Raises:
         TableError: If it holds something else.
     """
-    if variable.categories == BOOLEANS:
-        return f"TRY_CAST({cell} AS BOOLEAN)"
     text = f"CAST({cell} AS VARCHAR)"
-    if variable.categories and is_long is False:  # 2.0 is the category 2
-        whole = f"CAST(CAST({cell} AS BIGINT) AS VARCHAR)"
-        return f"CASE WHEN {cell} = FLOOR({cell}) THEN {whole} ELSE {text} END"
     if variable.categories:
-        return f"TRIM({text})"
+        return _category(f"TRIM({text})", variable.categories)
     if is_long is None and variable.unit == DATE_UNIT:
         return f"EPOCH_US(CAST({cell} AS TIMESTAMP)) / 86400000000e0"
     if is_long is None:
@@ -130,6 +126,24 @@ def _input(cell: str, title: str, is_long: bool | None, variable: Variable) -> s
         )
     # an engine may not round to the nearest double, unless it reads a text
     return f"CAST({text if is_long else cell} AS DOUBLE)"
+
+
+def _category(text: str, categories: Sequence[str]) -> str:
+    """Return what `placer` makes of a text, as SQL: 2.00 is the category 2."""
+    number = f"TRY_CAST({text} AS DOUBLE)"
+    is_true, is_false = (f"LOWER({text}) = '{one}'" for one in ("true", "false"))
+    if categories == BOOLEANS:
+        cases = f"{is_true} OR {number} = 1 THEN TRUE WHEN {is_false} OR {number} = 0"
+        return f"CASE WHEN {cases} THEN FALSE END"
+    digits = [f"'{one}'" for one in categories if number_of(one) is not None]
+    is_whole = f"{number} = FLOOR({number}) AND ABS({number}) < 1e15"
+    whole = f"CAST(CAST({number} AS BIGINT) AS VARCHAR)"
+    return (
+        f"CASE WHEN {is_true} THEN 'True' WHEN {is_false} THEN 'False' "
+        f"WHEN {text} IN ({', '.join(digits) or 'NULL'}) THEN {text} "
+        f"WHEN {is_whole} THEN {whole} "
+        f"ELSE COALESCE(CAST({number} AS VARCHAR), {text}) END"
+    )
 
 
 def _quoted(name: str) -> str:
