@@ -130,13 +130,13 @@ def _sound_labels(y: Any) -> Any:
 class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # both are untyped
     """Learn a fuzzy decision tree and answer by it.
 
-    Class k of the tree is named `str(classes_[k])`; its columns are those of the
-    table it was fitted on, or `x1`, `x2`, ... Frames may have columns of text,
-    categories, truth values and dates. Missing values are learnt from and answered;
-    paper mode refuses them. Rows and classes may have weights; paper mode counts rows,
-    so it takes whole weights of rows alone. A pickle or a copy of a fitted classifier
-    holds its tree, with the range of each column and the centre of each combination,
-    and no training rows.
+    Class k of the tree is named `str(classes_[k])`; its columns are those of the table
+    it was fitted on, or `x1`, `x2`, ... Frames may have columns of text, categories,
+    truth values and dates. Missing values are learnt from and answered, and an infinite
+    value is a missing one; paper mode refuses both. Rows and classes may have weights;
+    paper mode counts rows, so it takes whole weights of rows alone. A pickle or a copy
+    of a fitted classifier holds its tree, with the range of each column and the centre
+    of each combination, and no training rows.
 
     Args:
         mode: `default`, or `paper` for the paper's algorithm to the letter.
@@ -237,7 +237,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         out. Of weights that are no whole numbers only the ratios matter.
 
         Args:
-            X: Finite numbers, shape (rows, columns).
+            X: Numbers, shape (rows, columns), or a frame. NaN and infinity are missing,
+                and `report_.rows_filled` counts the rows that have one.
             y: A label for each row; at least two different ones.
             sample_weight: A weight for each row, finite and not negative; all 1 unless
                 given.
@@ -346,9 +347,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             weights = checked_weights(np.asarray(sample_weight), len(values))
         return self._learn(values, labels, weights)
 
-    def _finite(self) -> bool | str:
-        """Return which numbers scikit-learn's check takes."""
-        return True if self.mode == "paper" else "allow-nan"
+    def _finite(self) -> bool:
+        """Return whether scikit-learn refuses values that are not finite."""
+        return self.mode == "paper"
 
     def __sklearn_tags__(self) -> Any:
         """Say that missing values and categories are learnt from, but in paper mode."""

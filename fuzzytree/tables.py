@@ -210,7 +210,7 @@ class Batch(msgspec.Struct, frozen=True, eq=False):
 
     Attributes:
         values: Shape (inputs, rows), in the order of the model's inputs.
-        missing: How many cells are missing.
+        missing: How many cells are missing; infinite ones are.
         unknown: How many cells are no category of the model, by input; they are NaN.
         extras: How many columns the model does not need.
         piece: The rows as they came.
@@ -1086,7 +1086,7 @@ def _fault_text(faults: _Faults) -> str:
 
 
 def _missing_cells(values: FloatArray) -> int:
-    return sum(int(np.count_nonzero(np.isnan(row))) for row in values)
+    return sum(int(np.count_nonzero(~np.isfinite(row))) for row in values)
 
 
 def _shortened(text: str) -> str:

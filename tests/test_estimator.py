@@ -329,6 +329,23 @@ def test_columns_of_text_may_have_numbers_as_names(names: list[Any]) -> None:
     assert model.predict(table[:4]).tolist() == [*"xyxy"]
 
 
+def test_infinity_is_missing_but_in_paper_mode() -> None:
+    values = np.array([[1.0], [np.inf], [3.0], [-np.inf], [2.0], [np.nan]] * 9)
+    labels = [*"abcbab"] * 9
+    model = FuzzyTreeClassifier().fit(values, labels)
+    assert model.report_.rows_filled == 27
+    missing = np.where(np.isinf(values), np.nan, values)
+    assert FuzzyTreeClassifier().fit(missing, labels).tree_ == model.tree_
+    for rows in (values, missing):
+        assert model.predict(rows).tolist() == ft.run(model.tree_, rows).classes
+    chunks = FuzzyTreeClassifier()
+    for part in (slice(0, 30), slice(30, None)):
+        chunks.partial_fit(values[part], labels[part], classes=[*"abc"])
+    assert chunks.tree_ == model.tree_
+    with pytest.raises(ValueError, match="Input X contains infinity"):
+        FuzzyTreeClassifier(mode="paper").fit(values[:2], labels[:2])
+
+
 def test_partial_fit_refuses_texts() -> None:
     table = pd.DataFrame({"z": pd.Categorical([1, 2, 1, 2])})
     with pytest.raises(ValueError, match="categories") as caught:

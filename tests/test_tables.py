@@ -314,9 +314,12 @@ def test_missing_values_of_tables_in_memory_are_nan() -> None:
         assert batch.missing == 1
 
 
-def test_infinity_is_a_number() -> None:
-    text = _csv("a\ninf\n-inf\nInfinity\n")
-    assert _values(text, ["a"]) == [[math.inf, -math.inf, math.inf]]
+def test_infinity_is_read_as_it_is_and_counted_as_missing() -> None:
+    text = "a\ninf\n-inf\nInfinity\n"
+    assert _values(_csv(text), ["a"]) == [[math.inf, -math.inf, math.inf]]
+    [batch] = batches(_csv(text), ["a"])
+    assert batch.missing == 3
+    assert read_table(_csv(text + "1\n"), target=[*"xyxy"]).missing == 3
 
 
 def test_numbers_are_read_to_the_last_digit() -> None:

@@ -205,7 +205,7 @@ def _typed_table(seed: int) -> pd.DataFrame:
     """Return a table whose types say more than the look of its cells."""
     rng = np.random.default_rng(seed)
     zips, masses = rng.integers(0, 9, 60), rng.normal(size=60)
-    masses[:6] = math.nan, math.nan, math.nan, 1e300, 0.0, -0.0
+    masses[:6] = math.nan, math.inf, -math.inf, 1e300, 0.0, -0.0
     counts = [None if k % 11 == 0 else k for k in rng.integers(0, 50, 60).tolist()]
     flags = [None if k % 13 == 0 else k % 2 == 0 for k in counts if k is not None]
     flags += [None] * (60 - len(flags))
