@@ -185,7 +185,8 @@ def drawn() -> str:
         table,
         target="cultivar",
         name="wine",
-        settings=ft.LearningSettings(columns_per_node=1, leaves=4),
+        columns_per_node=1,
+        leaves=4,
     )
     return picture(tree, ft.rules_from_tree(tree))
 

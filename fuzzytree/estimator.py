@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Never, Self
 
 import narwhals as nw
 import numpy as np
@@ -20,6 +20,7 @@ from fuzzytree.learning import (
     LearningSettings,
     importances,
     refuse_measurements,
+    refuse_unknown,
 )
 from fuzzytree.model import (
     DATE_UNIT,
@@ -75,12 +76,13 @@ def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
 
 def _frame_of(X: Any) -> nw.DataFrame[Any] | None:
     """Return a frame, None for anything else, or if two columns have one name."""
+    table = X
     if type(X).__name__ == "RecordBatch":
         import pyarrow as pa
 
-        X = pa.Table.from_batches([X])
+        table = pa.Table.from_batches([X])
     try:
-        frame = nw.from_native(X, eager_only=True)
+        frame = nw.from_native(table, eager_only=True)
     except TypeError:
         return None
     return frame if len(set(frame.columns)) == len(frame.columns) else None
@@ -208,7 +210,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         costs: Mapping[str, float] | None = None,
         class_weight: LabelWeight = None,
         seed: int = 0,
+        **unknown: Never,
     ) -> None:
+        refuse_unknown("FuzzyTreeClassifier", unknown, self._get_param_names())
         self.mode = mode
         self.columns_per_node = columns_per_node
         self.leaves = leaves
@@ -266,7 +270,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 kept = np.flatnonzero(weights)
                 rows = [_safe_indexing(part, kept) for part in rows]
                 weights = weights[kept]
-        options = {"dtype": np.float64, "ensure_all_finite": self._finite()}
+        options: dict[str, Any] = {"dtype": np.float64}
+        options["ensure_all_finite"] = self._finite()
         categories: dict[str, tuple[str, ...]] = {}
         dates: tuple[str, ...] = ()
         frame = _frame_of(rows[0])
@@ -319,7 +324,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             )
         frame = _frame_of(X)
         for name, kind in frame.schema.items() if frame else ():
-            if kind in (nw.String, nw.Categorical, nw.Enum):
+            if isinstance(kind, nw.String | nw.Categorical | nw.Enum):
                 raise ValueError(
                     f"X: column {name!r} holds texts, whose categories only all rows "
                     "show: call fit, or learn from parts with fuzzytree.Learner"
@@ -539,23 +544,10 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             self._run = _prepared(self.tree_)
 
     def _settings(self) -> LearningSettings:
-        return LearningSettings(
-            mode=self.mode,
-            columns_per_node=self.columns_per_node,
-            leaves=self.leaves,
-            min_rows=self.min_rows,
-            depth=self.depth,
-            alpha=self.alpha,
-            l_max=self.l_max,
-            points=self.points,
-            separate_sides=self.separate_sides,
-            patterns_per_class=self.patterns_per_class,
-            shrinkage=self.shrinkage,
-            entry=self.entry,
-            costs=self.costs or {},
-            class_weight=_by_name(self.class_weight),
-            seed=self.seed,
-        )
+        chosen: dict[str, Any] = self.get_params(deep=False)
+        chosen["costs"] = self.costs or {}
+        chosen["class_weight"] = _by_name(self.class_weight)
+        return LearningSettings(**chosen)
 
     def _columns(self) -> list[str]:
         names = getattr(self, "feature_names_in_", None)
@@ -573,7 +565,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _values(self, X: npt.ArrayLike) -> FloatArray:
         """Return the columns that the tree needs, shape (inputs, rows)."""
         check_is_fitted(self)
-        options = {"dtype": np.float64, "ensure_all_finite": self._finite()}
+        options: dict[str, Any] = {"dtype": np.float64}
+        options["ensure_all_finite"] = self._finite()
         frame = _frame_of(X)
         if frame is None:
             values = _validated(self, X, reset=False, **options)

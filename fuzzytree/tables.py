@@ -1644,7 +1644,7 @@ def _frame_piece(source: object, name: str, only: Only = None) -> TablePiece:
         kind = series.dtype
         is_array = kind.is_numeric() or kind == nw.Datetime
         cells.append(series.to_numpy() if is_array else series.to_list())
-        if kind in (nw.String, nw.Categorical, nw.Enum):
+        if isinstance(kind, nw.String | nw.Categorical | nw.Enum):
             native = getattr(series.to_native(), "dtype", None)
             texts |= {column} if str(native) != "object" else set()
     return TablePiece(

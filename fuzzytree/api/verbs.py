@@ -9,7 +9,7 @@ import stat
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeVar, cast, get_args
+from typing import TYPE_CHECKING, Literal, TypeVar, Unpack, cast, get_args
 
 import msgspec
 import numpy as np
@@ -84,8 +84,9 @@ def learn(
     ignore: Sequence[str] = (),
     name: str | None = None,
     units: Mapping[str, str] | None = None,
-    settings: learning.LearningSettings | None = None,
+    settings: learning.LearningSettings | learning.SettingArguments | None = None,
     progress: Progress | None = None,
+    **named: Unpack[learning.SettingArguments],
 ) -> FuzzyTree:
     """Learn a fuzzy tree from a table with a class for each row.
 
@@ -104,12 +105,15 @@ def learn(
         units: The units of columns, by name.
         settings: How to learn; the defaults of `LearningSettings` unless given.
         progress: Called with the current step and the share that is done.
+        named: Settings by their names, such as `leaves=4`, which go before `settings`;
+            see `LearningSettings`.
 
     Raises:
+        TypeError: If there is no setting of a name.
         TableError: If a column is absent, if a weight is missing, infinite or negative,
             or if there are no rows.
-        ValueError: If weights that are no column are not one number for each row, or
-            cannot be weights.
+        ValueError: If a setting is out of its range; if weights that are no column are
+            not one number for each row, or cannot be weights.
         LearningError: If nothing can be learnt from the table, or its target is
             continuous.
 
@@ -121,11 +125,12 @@ def learn(
         >>> tree = learn(
         ...     np.array([[1.0], [1.5], [7.0], [7.5]]),
         ...     target=["soft", "soft", "firm", "firm"],
+        ...     leaves=2,
         ... )
         >>> run(tree, np.array([[2.0], [7.0]])).classes
         ['soft', 'firm']
     """
-    chosen, engine = settings or learning.LearningSettings(), engine_of(table)
+    chosen, engine = learning.settings_of(settings, named), engine_of(table)
     result: Table | learning.Learner
     if engine is not None:
         if weights is not None:

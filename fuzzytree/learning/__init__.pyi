@@ -16,4 +16,7 @@ from .parts import refuse_repeated as refuse_repeated
 from .parts import state_content as state_content
 from .settings import ClassWeight as ClassWeight
 from .settings import LearningSettings as LearningSettings
+from .settings import SettingArguments as SettingArguments
+from .settings import refuse_unknown as refuse_unknown
+from .settings import settings_of as settings_of
 from .weights import class_weights as class_weights

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from numbers import Real
-from typing import Literal
+from typing import Final, Literal, TypedDict
 
 import msgspec
+
+from fuzzytree.model import name_choice
 
 ClassWeight = Mapping[str, float] | Literal["balanced"] | None
 
@@ -148,6 +150,77 @@ class LearningSettings(
     def drops_missing(self) -> bool:
         """Whether rows with a missing value are left out."""
         return self.mode == "paper" or self.missing == "drop"
+
+
+class SettingArguments(TypedDict, total=False):
+    """The fields of `LearningSettings`, as keywords of a function."""
+
+    mode: Literal["default", "paper"]
+    columns_per_node: int | None
+    leaves: int | None
+    min_rows: int | None
+    depth: int | None
+    entry: float
+    shrinkage: float
+    alpha: float | None
+    l_max: float | None
+    patterns_per_class: int | Mapping[str, int] | None
+    keep_reversals: bool
+    points: int
+    separate_sides: bool
+    costs: Mapping[str, float]
+    class_weight: ClassWeight
+    rows_per_class: int
+    seed: int
+    missing: Literal["learn", "drop", "refuse"]
+
+
+OTHER_NAMES: Final = {
+    "max_depth": "depth",
+    "max_leaf_nodes": "leaves",
+    "min_samples_leaf": "min_rows",
+    "random_state": "seed",
+}
+"""What scikit-learn calls a setting, and what it is called here."""
+
+
+def settings_of(
+    settings: LearningSettings | SettingArguments | None, arguments: SettingArguments
+) -> LearningSettings:
+    """Return settings, in which those that are named go before the others.
+
+    Raises:
+        TypeError: If there is no setting of a name.
+        ValueError: As `LearningSettings`.
+
+    Example:
+        >>> settings_of({"leaves": 4, "seed": 1}, {"leaves": 5}).leaves
+        5
+    """
+    if not isinstance(settings, LearningSettings):
+        arguments = {**(settings or {}), **arguments}
+        settings = LearningSettings()
+    fields = LearningSettings.__struct_fields__
+    refuse_unknown("learn", arguments, fields, ("weights", "ignore", "name", "units"))
+    return msgspec.structs.replace(settings, **arguments)
+
+
+def refuse_unknown(
+    taker: str,
+    names: Iterable[str],
+    settings: Collection[str],
+    others: Iterable[str] = (),
+) -> None:
+    """Raise a TypeError for the first name that is no setting.
+
+    `others` are the names of what the taker takes besides.
+    """
+    for name in names:
+        if name not in settings:
+            close = OTHER_NAMES.get(name)
+            choice = name_choice(name, [*settings, *others])
+            choice = f"it is {close!r} here" if close else choice
+            raise TypeError(f"{taker} has no setting {name!r}; {choice}")
 
 
 _OF_MODE = {

@@ -82,6 +82,20 @@ def test_an_unknown_option_is_a_sentence_with_a_guess(call: Call) -> None:
     assert err.endswith("\n  fuzzytree run --help lists the options\n")
 
 
+def test_an_option_of_scikit_learn_is_refused_with_ours(call: Call) -> None:
+    assert call("learn", "a.csv", "--random-state", "3") == (
+        2,
+        "",
+        "no such option '--random-state'; it is '--seed' here\n"
+        "  fuzzytree learn --help lists the options\n",
+    )
+    assert call("show", "a.yaml", "--random-state", "3") == (
+        2,
+        "",
+        "no such option '--random-state'\n  fuzzytree show --help lists the options\n",
+    )
+
+
 def test_a_missing_argument_is_a_sentence(call: Call) -> None:
     message = "missing argument 'MODEL'\n  fuzzytree run --help lists the options\n"
     assert call("run") == (2, "", message)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_type_hints
 
+import numpy as np
 import pytest
 
-from fuzzytree.learning import LearningSettings
+import fuzzytree as ft
+from fuzzytree.learning import LearningSettings, SettingArguments, settings_of
 
 
 @pytest.mark.parametrize(
@@ -58,3 +60,56 @@ def test_a_setting_out_of_its_range_is_refused(
     with pytest.raises(ValueError, match=r".") as caught:
         LearningSettings(**wrong)
     assert str(caught.value) == message
+
+
+def test_every_setting_can_be_named_with_its_type() -> None:
+    assert get_type_hints(SettingArguments) == get_type_hints(LearningSettings)
+
+
+def test_settings_by_name_go_before_a_mapping_or_an_object() -> None:
+    both = LearningSettings(leaves=5, columns_per_node=1)
+    assert (
+        settings_of(LearningSettings(leaves=4, columns_per_node=1), {"leaves": 5})
+        == both
+    )
+    assert settings_of({"leaves": 4, "columns": 1}, {"leaves": 5}) == both
+    assert settings_of(None, {}) == LearningSettings()
+    rows, labels = [[1.0], [2.0], [4.0], [5.0], [8.0], [9.0]] * 4, [*"aabbcc"] * 4
+    values = np.array(rows)
+    assert len(ft.learn(values, target=labels, leaves=2).leaves) == 2
+    assert len(ft.learn(values, target=labels, settings={"leaves": 2}).leaves) == 2
+    with pytest.raises(ValueError, match="leaves is at least 1, not 0"):
+        ft.learn(values, target=labels, leaves=0)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("max_depth", "it is 'depth' here"),
+        ("max_leaf_nodes", "it is 'leaves' here"),
+        ("min_samples_leaf", "it is 'min_rows' here"),
+        ("random_state", "it is 'seed' here"),
+        ("leafs", "there is {}, ... (did you mean 'leaves'?)"),
+    ],
+)
+def test_a_setting_of_another_name_is_refused_with_ours(
+    name: str, message: str
+) -> None:
+    wrong: Any = {name: 3}
+    names = [*LearningSettings.__struct_fields__][:12]
+    for settings, more in ((None, wrong), (wrong, {})):
+        with pytest.raises(TypeError) as caught:
+            ft.learn(np.zeros((2, 1)), target=[0, 1], settings=settings, **more)
+        shown = message.format(", ".join(names))
+        assert str(caught.value) == f"learn has no setting {name!r}; {shown}"
+    with pytest.raises(TypeError) as caught:
+        ft.FuzzyTreeClassifier(**wrong)
+    names = sorted(ft.FuzzyTreeClassifier().get_params())[:12]
+    shown = message.format(", ".join(names))
+    assert str(caught.value) == f"FuzzyTreeClassifier has no setting {name!r}; {shown}"
+
+
+def test_an_argument_of_another_name_is_refused_with_ours() -> None:
+    wrong: Any = {"weight": [1, 1]}
+    with pytest.raises(TypeError, match=r"\(did you mean 'weights'\?\)$"):
+        ft.learn(np.zeros((2, 1)), target=[0, 1], **wrong)

@@ -261,7 +261,7 @@ def test_a_table_has_one_tree_and_one_answer_in_every_container(
 ) -> None:
     frame = _typed_table(seed)
     tables = _containers(frame, tmp_path)
-    few = ft.LearningSettings(columns=1, leaves=4)
+    few = ft.LearningSettings(columns_per_node=1, leaves=4)
     trees = {
         name: ft.learn(table, target="kind", name="t", settings=few)
         for name, table in tables.items()
@@ -292,7 +292,9 @@ def test_a_table_has_one_tree_and_one_answer_in_every_container(
 
     for name in ("pandas", "pandas of arrow", "polars", "arrow"):
         cells = nw.from_native(tables[name], eager_only=True).drop("kind").to_native()
-        model = ft.FuzzyTreeClassifier(columns=1, leaves=4).fit(cells, frame["kind"])
+        model = ft.FuzzyTreeClassifier(columns_per_node=1, leaves=4).fit(
+            cells, frame["kind"]
+        )
         assert model.tree_ == replace(tree, name="tree"), name
         assert model.predict(cells).tolist() == classes
         assert model.apply(cells).tolist() == rules
