@@ -86,7 +86,7 @@ def test_an_option_of_scikit_learn_is_refused_with_ours(call: Call) -> None:
     assert call("learn", "a.csv", "--random-state", "3") == (
         2,
         "",
-        "no such option '--random-state'; it is '--seed' here\n"
+        "no such option '--random-state' (did you mean '--seed'?)\n"
         "  fuzzytree learn --help lists the options\n",
     )
     assert call("show", "a.yaml", "--random-state", "3") == (

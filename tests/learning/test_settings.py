@@ -72,7 +72,7 @@ def test_settings_by_name_go_before_a_mapping_or_an_object() -> None:
         settings_of(LearningSettings(leaves=4, columns_per_node=1), {"leaves": 5})
         == both
     )
-    assert settings_of({"leaves": 4, "columns": 1}, {"leaves": 5}) == both
+    assert settings_of({"leaves": 4, "columns_per_node": 1}, {"leaves": 5}) == both
     assert settings_of(None, {}) == LearningSettings()
     rows, labels = [[1.0], [2.0], [4.0], [5.0], [8.0], [9.0]] * 4, [*"aabbcc"] * 4
     values = np.array(rows)

@@ -464,7 +464,7 @@ NO_BANDS = [
 
 @pytest.mark.parametrize("suffix", [".fcl", ".fll", ".fis", ".fml"])
 def test_bands_come_back_from_a_file_as_bands_and_points_as_points(suffix: str) -> None:
-    shapes = [*BANDS, *NO_BANDS]
+    shapes: list[Band | Points] = [*BANDS, *NO_BANDS]
     terms = tuple(Term(f"t{k}", shape) for k, shape in enumerate(shapes))
     rules = tuple(Rule((Proposition("x", (t.name,)),), "a") for t in terms)
     base = RuleBase("m", ("a",), (Variable("x", terms),), rules)

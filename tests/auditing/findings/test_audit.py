@@ -82,7 +82,7 @@ def test_nothing_that_fails_is_found_in_a_fresh_tree(table: str) -> None:
         data = getattr(datasets, f"load_{table}")(as_frame=True)
         names = data.target_names[data.target]
         tree = ft.learn(data.data, target=names)
-    found = audit(Material(tree), selection=AuditSelection(ignore=["FT6"]))
+    found = audit(Material(tree), selection=AuditSelection(skip=["FT6"]))
     assert [a.sentence for a in found.findings if a.severity != "info"] == []
     assert not {a.code for a in found.answers} & {"FT201", "FT203"}
     why = "not asked where true by construction of relative rules"
@@ -113,7 +113,7 @@ def test_the_raw_rules_of_a_tree_are_compared_on_request() -> None:
 def test_a_dead_leaf_and_a_node_without_a_choice_are_found_in_a_tree(
     tree: FuzzyTree, codes: set[str]
 ) -> None:
-    found = audit(Material(tree), domain=UNIT, selection=AuditSelection(ignore=["FT6"]))
+    found = audit(Material(tree), domain=UNIT, selection=AuditSelection(skip=["FT6"]))
     assert {answer.code for answer in found.findings} == codes
 
 
