@@ -20,6 +20,7 @@ from .converting import deciding as deciding
 from .converting import export as export
 from .converting import format_of as format_of
 from .converting import formed as formed
+from .converting import in_dialect as in_dialect
 from .converting import load as load
 from .converting import load_content as load_content
 from .converting import proved as proved

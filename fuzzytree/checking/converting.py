@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast, get_args
 
@@ -512,6 +512,14 @@ def _decided(model: Document, other: Document) -> str:
     return f"; the same rule wins in all of {len(rows)} generated rows"
 
 
+def in_dialect(
+    options: Mapping[str, Option], reading: Reading, form: Format
+) -> dict[str, Option]:
+    """Return a writer's options, with the dialect of what was read in its format."""
+    name, _, dialect = reading.dialect.partition(":")
+    return {"dialect": dialect, **options} if name == form.name else {**options}
+
+
 def _certified(model: Model, form: Format, dtype: object) -> Proof:
     from fuzzytree.numerics import certify
 
@@ -609,6 +617,7 @@ def convert(
         kind=terms,
         conjunction=conjunction,
     )
-    written = export(model, form.name, allow_loss=allow_loss, **options)
+    chosen = in_dialect(options, reading, form)
+    written = export(model, form.name, allow_loss=allow_loss, **chosen)
     proof = proved(model, form, written, dtype=options.get("dtype"))
     return Conversion(name, read_as, reading, form.name, model, written, proof)

@@ -53,7 +53,9 @@ class ConvertOptions(WritingOptions):
     read_as: str | None = option(
         "--from FORMAT", "Format of IN; from its suffix by default."
     )
-    dialect: str | None = option("--dialect NAME", "Dialect of the format of OUT.")
+    dialect: str | None = option(
+        "--dialect NAME", "Dialect of OUT; that of IN where both have one format."
+    )
     tolerance: str | None = option(
         "--tolerance NUMBER", "Largest error of a degree where a curve becomes points."
     )
@@ -150,11 +152,12 @@ def carry(
         notes: Lines to print behind those of the file and its proof.
     """
     from fuzzytree import report
-    from fuzzytree.checking import export, proved
+    from fuzzytree.checking import export, in_dialect, proved
     from fuzzytree.cli.representation import represented
     from fuzzytree.model import kind_of, loss_text
 
     model = represented(found.model, form, chosen)
+    options = in_dialect(options, found, form)
     facts: dict[str, object] = {
         "read": {
             "file": source,

@@ -68,9 +68,10 @@ class ReaderNotes(msgspec.Struct, frozen=True):
         """Whether there are so many mistakes that the reader looks for no more."""
         return len(self.mistakes) >= MOST_SHOWN
 
-    def reading(self, model: Document, locate: Locate) -> Reading:
+    def reading(self, model: Document, locate: Locate, dialect: str = "") -> Reading:
         """Return a model with the losses and remarks."""
-        return Reading(model, tuple(self.losses), tuple(self.remarks), locate)
+        losses, remarks = tuple(self.losses), tuple(self.remarks)
+        return Reading(model, losses, remarks, locate, dialect)
 
 
 def report(name: str, mistakes: Sequence[FileMistake]) -> ReadError:

@@ -111,12 +111,15 @@ class Reading(msgspec.Struct, frozen=True):
             place.
         remarks: What else is worth knowing, such as the dialect that was detected.
         locate: Where the parts of the model stand in the file.
+        dialect: Whose meaning counted, behind the format: `fcl:jfuzzylogic`; empty of
+            a format that has one meaning.
     """
 
     model: Document
     losses: tuple[Loss, ...] = ()
     remarks: tuple[str, ...] = ()
     locate: Locate = nowhere
+    dialect: str = ""
 
 
 class Writer(Protocol):

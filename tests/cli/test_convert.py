@@ -580,3 +580,29 @@ def test_points_in_pmml_are_refused_like_other_losses(call: Call) -> None:
     assert code == 1
     assert err.endswith("\n  pass --allow-loss to write it as stated\n")
     assert call(*words, "--allow-loss")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("sample", "suffix", "dialect"),
+    [
+        ("a default answer", ".fcl", "portable"),
+        ("a default answer", ".fcl", "iec"),
+        ("a default answer", ".fcl", "fuzzylite"),
+        ("a default answer", ".fcl", "jfuzzylogic"),
+        ("Mamdani, centroid", ".fcl", "fuzzylite"),
+        ("number of samples", ".fis", "matlab"),
+        ("number of samples", ".fis", "octave"),
+        ("number of samples", ".fis", "fuzzylite"),
+    ],
+)
+def test_a_file_stays_in_its_dialect(
+    call: Call, sample: str, suffix: str, dialect: str
+) -> None:
+    ft.save(all_samples()[sample], "s.yaml")
+    words = ("convert", "s.yaml", f"a{suffix}", "--dialect", dialect, "--allow-loss")
+    assert call(*words, "--quiet")[0] == 0
+    assert call("convert", f"a{suffix}", f"b{suffix}", "--quiet") == (0, "", "")
+    assert Path(f"a{suffix}").read_bytes() == Path(f"b{suffix}").read_bytes()
+    assert ft.convert(f"a{suffix}", suffix).written.content == (
+        Path(f"a{suffix}").read_bytes()
+    )

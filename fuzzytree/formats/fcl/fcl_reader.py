@@ -132,7 +132,7 @@ def read_fcl(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     except InvalidModelError as error:
         raise report(name, placed(positions(), error.mistakes)) from error
     model, facts = _model(joined_by_number(system), text.text, notes)
-    return notes.reading(model, locating(positions, facts))
+    return notes.reading(model, locating(positions, facts), f"fcl:{dialect}")
 
 
 def _groups(variables: Mapping[str, FclVariable]) -> Iterator[PositionGroup]:

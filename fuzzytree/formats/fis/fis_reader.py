@@ -95,12 +95,13 @@ def read_fis(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     """
     notes = ReaderNotes()
     page = text.read_page(content, name, notes)
-    parts = _system(page, name, dialect or _dialect(page, notes), notes)
+    dialect = dialect or _dialect(page, notes)
+    parts = _system(page, name, dialect, notes)
     if notes.mistakes or parts is None:
         raise report(name, notes.mistakes)
     system, positions = parts
     model, facts = as_written(system, page.comments)
-    return notes.reading(model, locating(positions, facts))
+    return notes.reading(model, locating(positions, facts), f"fis:{dialect}")
 
 
 def _dialect(page: text.FisFile, notes: ReaderNotes) -> Dialect:
