@@ -1,20 +1,16 @@
 """Conditions in FIS: a number for each input, all joined by and or by or.
 
-Several propositions on one input become one term of that input: the least or the
-greatest of the degrees at each value, which is exact but for rounding, or their
-product within a tolerance.
+Several propositions on one input become one term of that input
+(`fuzzytree.semantics.conversion.joint_terms`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from fuzzytree import numerics
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.fuzzy_files import operands
 from fuzzytree.formats import CONCLUDING_HEDGES, FIS_HEDGES, Dialect
 from fuzzytree.model import (
     And,
@@ -35,10 +31,7 @@ from fuzzytree.model import (
     questions,
     unlike,
 )
-from fuzzytree.numerics import Lines
-from fuzzytree.semantics import shape_of, split
-
-EVERYWHERE: Final = Points((0.0,), (1.0,))
+from fuzzytree.semantics import EVERYWHERE, joint_points, operands, split
 
 
 class FisRule(msgspec.Struct, frozen=True):
@@ -106,8 +99,8 @@ class FisTerms:
             return str(self.place(*self._made[whole]))
         variable = next(questions(whole)).variable
         try:
-            lines, bound = self._lines(whole)
-            points, rounding = numerics.rounded_lines(lines)
+            block = self.system.blocks[0]
+            points, bound = joint_points(whole, self.labels, block, self.tolerance)
         except LossError as error:
             raise LossError(
                 f"{variable!r} has several conditions, and {error}"
@@ -117,58 +110,9 @@ class FisTerms:
         self._made[whole] = (variable, label)
         what = f"the rules test it jointly; the term {label!r} stands for that"
         self.losses.append(
-            Loss(f"{_text_of(whole)} of {variable!r}"[:200], what, bound + rounding)
+            Loss(f"{_text_of(whole)} of {variable!r}"[:200], what, bound)
         )
         return str(number)
-
-    def _lines(self, condition: Condition) -> tuple[Lines, float]:
-        """Return the degree of a condition on one input as lines, and their error."""
-        match condition:
-            case Proposition():
-                return self._lines_of(condition), 0.0
-            case Not(part=part):
-                lines, bound = self._lines(part)
-                return numerics.negated(lines), bound
-            case And(parts=parts) | Or(parts=parts):
-                result = [self._lines(part) for part in parts]
-                total, bound = result[0]
-                join = self._join(is_or=isinstance(condition, Or))
-                for lines, error in result[1:]:
-                    total, more = join(total, lines)
-                    # Errors of a product add; least and greatest pass one on.
-                    bound = bound + error + more
-                return total, bound
-
-    def _lines_of(self, proposition: Proposition) -> Lines:
-        hedges = _merged(proposition.hedges)
-        if hedges == ("any",):
-            return numerics.lines_of(EVERYWHERE)
-        if proposition.term is None or hedges not in ((), ("not",)):
-            raise LossError(
-                f"{proposition.variable!r} has several conditions with hedges"
-            )
-        label = self.labels[proposition.variable][
-            self.place(proposition.variable, proposition.term) - 1
-        ]
-        shape = shape_of(label.function)
-        if not isinstance(shape, Points):
-            text = f"the term {proposition.term!r} of {proposition.variable!r}"
-            raise LossError(f"{text} has several conditions and is no list of points")
-        lines = numerics.scaled(numerics.lines_of(shape), label.height)
-        return numerics.negated(lines) if hedges else lines
-
-    def _join(self, *, is_or: bool) -> Callable[[Lines, Lines], tuple[Lines, float]]:
-        block = self.system.blocks[0]
-        norm = block.disjunction if is_or else block.conjunction
-        match norm:
-            case "minimum":
-                return lambda one, other: (numerics.least(one, other), 0.0)
-            case "maximum":
-                return lambda one, other: (numerics.greatest(one, other), 0.0)
-            case "product":
-                return lambda one, other: numerics.product(one, other, self.tolerance)
-            case _:
-                raise LossError(f"one input has several conditions, joined by {norm}")
 
 
 def lines_of(

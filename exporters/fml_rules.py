@@ -12,7 +12,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.fuzzy_files import operands, refuse
+from fuzzytree.exporters.fuzzy_files import refuse
 from fuzzytree.exporters.xml_text import XmlElement, element, text_element
 from fuzzytree.formats import FML_SNORMS, FML_TNORMS, MODIFIERS, word_for
 from fuzzytree.model import (
@@ -34,7 +34,7 @@ from fuzzytree.model import (
     questions,
     unlike,
 )
-from fuzzytree.semantics import split
+from fuzzytree.semantics import operands, split
 
 Clause = tuple[str, str, str]
 """A variable, a term, and a modifier, which may be empty."""

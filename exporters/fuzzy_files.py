@@ -9,16 +9,12 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
-    And,
-    Condition,
     Defuzzifier,
     FuzzySystem,
     Linear,
     Loss,
     NameMap,
-    Or,
     Points,
-    RuleBlock,
     Singleton,
     SystemOutput,
     Term,
@@ -134,16 +130,3 @@ def grid_losses(output: SystemOutput, usual: Defuzzifier, whose: str) -> Iterato
         way = "higher" if usual.grid == "middle" else "lower"
         what += f", each half a piece ({half:.3g}) {way}"
     yield Loss(f"output {output.name!r}", what)
-
-
-def operands(condition: Condition, block: RuleBlock) -> list[Condition]:
-    """Return the operands of a condition; an and within an and adds its own."""
-    if not isinstance(condition, And | Or):
-        return [condition]
-    norm = block.disjunction if isinstance(condition, Or) else block.conjunction
-    parts: list[Condition] = []
-    for place, part in enumerate(condition.parts):
-        is_open = place == 0 or norm in ("minimum", "maximum")
-        is_same = isinstance(part, type(condition))
-        parts += operands(part, block) if is_same and is_open else [part]
-    return parts

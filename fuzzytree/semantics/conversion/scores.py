@@ -50,7 +50,6 @@ from fuzzytree.model import (
     Loss,
     Not,
     Or,
-    Points,
     Proposition,
     RuleBase,
     RuleBlock,
@@ -65,6 +64,7 @@ from fuzzytree.model import (
     stand_ins,
     unlike,
 )
+from fuzzytree.semantics.conversion.joint_terms import EVERYWHERE
 
 Scores = Literal["rule", "class", "winner"]
 """What the outputs of a system say about a rule base."""
@@ -74,7 +74,6 @@ Always = Literal["nothing", "any", "term"]
 term of degree 1 everywhere. The input is the first that is not for sums alone."""
 
 _AVERAGE = Defuzzifier("weighted average")
-_EVERYWHERE = Points((0.0,), (1.0,))
 
 
 def as_system(
@@ -322,7 +321,7 @@ def _with_tautology(
     if always == "any":
         return inputs, Proposition(first.name, (), ("any",))
     name = unlike("always", {label.name for label in first.terms})
-    label = Term(name, _EVERYWHERE)
+    label = Term(name, EVERYWHERE)
     changed = replace(first, terms=(*first.terms, label))
     return tuple(changed if one is first else one for one in inputs), Proposition(
         first.name, (name,)

@@ -1,0 +1,119 @@
+"""One term for several conditions on one input, for rules with one term for each input.
+
+It is the least or the greatest of their degrees at each value, which is exact but for
+rounding, or their product within a tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from fuzzytree import numerics
+from fuzzytree.errors import LossError
+from fuzzytree.model import (
+    And,
+    Condition,
+    Not,
+    Or,
+    Points,
+    Proposition,
+    RuleBlock,
+    Term,
+)
+from fuzzytree.numerics import Lines
+from fuzzytree.semantics.conversion.points import shape_of
+
+EVERYWHERE = Points((0.0,), (1.0,))
+"""Degree 1 at every value."""
+
+TOLERANCE = 1e-6
+"""The largest error of a degree in a file, unless its writer is given another one."""
+
+
+def operands(condition: Condition, block: RuleBlock) -> list[Condition]:
+    """Return the operands of a condition; an and within an and adds its own."""
+    if not isinstance(condition, And | Or):
+        return [condition]
+    norm = block.disjunction if isinstance(condition, Or) else block.conjunction
+    parts: list[Condition] = []
+    for place, part in enumerate(condition.parts):
+        is_open = place == 0 or norm in ("minimum", "maximum")
+        is_same = isinstance(part, type(condition))
+        parts += operands(part, block) if is_same and is_open else [part]
+    return parts
+
+
+def joint_points(
+    condition: Condition,
+    labels: Mapping[str, Sequence[Term]],
+    block: RuleBlock,
+    tolerance: float = TOLERANCE,
+) -> tuple[Points, float]:
+    """Return the points of a condition on one input, and how far they can be off.
+
+    Args:
+        condition: What tests the input.
+        labels: The terms of each input.
+        block: The rules' norms.
+        tolerance: The largest error of a product.
+
+    Raises:
+        LossError: If a term is no list of points, or a hedge or norm has no lines.
+    """
+    lines, bound = _lines(condition, labels, block, tolerance)
+    points, rounding = numerics.rounded_lines(lines)
+    return points, bound + rounding
+
+
+def _lines(
+    condition: Condition,
+    labels: Mapping[str, Sequence[Term]],
+    block: RuleBlock,
+    tolerance: float,
+) -> tuple[Lines, float]:
+    """Return the degree of a condition on one input as lines, and their error."""
+    match condition:
+        case Proposition():
+            return _lines_of(condition, labels), 0.0
+        case Not(part=part):
+            lines, bound = _lines(part, labels, block, tolerance)
+            return numerics.negated(lines), bound
+        case And(parts=parts) | Or(parts=parts):
+            result = [_lines(part, labels, block, tolerance) for part in parts]
+            total, bound = result[0]
+            is_or = isinstance(condition, Or)
+            join = _join(block.disjunction if is_or else block.conjunction, tolerance)
+            for lines, error in result[1:]:
+                total, more = join(total, lines)
+                # Errors of a product add; least and greatest pass one on.
+                bound = bound + error + more
+            return total, bound
+
+
+def _lines_of(proposition: Proposition, labels: Mapping[str, Sequence[Term]]) -> Lines:
+    variable, hedges = proposition.variable, proposition.hedges
+    if hedges[:1] == ("any",):
+        return numerics.lines_of(EVERYWHERE)
+    if proposition.term is None or hedges not in ((), ("not",)):
+        raise LossError(f"{variable!r} has several conditions with hedges")
+    label = next(one for one in labels[variable] if one.name == proposition.term)
+    shape = shape_of(label.function)
+    if not isinstance(shape, Points):
+        text = f"the term {proposition.term!r} of {variable!r}"
+        raise LossError(f"{text} has several conditions and is no list of points")
+    lines = numerics.scaled(numerics.lines_of(shape), label.height)
+    return numerics.negated(lines) if hedges else lines
+
+
+def _join(
+    norm: str | None, tolerance: float
+) -> Callable[[Lines, Lines], tuple[Lines, float]]:
+    match norm:
+        case "minimum":
+            return lambda one, other: (numerics.least(one, other), 0.0)
+        case "maximum":
+            return lambda one, other: (numerics.greatest(one, other), 0.0)
+        case "product":
+            return lambda one, other: numerics.product(one, other, tolerance)
+        case _:
+            raise LossError(f"one input has several conditions, joined by {norm}")
