@@ -33,6 +33,7 @@ from fuzzytree.report.audit_states import (
 )
 from fuzzytree.report.drawing import axes_of
 from fuzzytree.report.markup import Markup
+from fuzzytree.report.models import missing_text
 from fuzzytree.report.parts import part, whole_page
 
 if TYPE_CHECKING:
@@ -73,11 +74,13 @@ def page(
         True
     """
     audit = as_in_file(audit)
-    classes = None if isinstance(model, FuzzySystem) else model.classes
+    classes, missing = None, audit.policy.missing or "no class"
+    if not isinstance(model, FuzzySystem):
+        classes, missing = model.classes, missing_text(model)
     sections = [*_sections(audit, model, rows, agreement, stability)]
     return whole_page(
         title=f"{audit.model}: audit",
-        head=part("head", audit, classes),
+        head=part("head", audit, classes, missing),
         verdict=verdict(audit),
         sections=sections,
         body=[part("section", *section) for section in sections],

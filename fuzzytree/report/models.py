@@ -170,16 +170,21 @@ def head_lines(model: Document) -> Iterator[str]:
     yield f"inputs   {len(model.inputs)}{of}: {', '.join(model.inputs) or 'none'}"
     yield f"classes  {len(model.classes)}: {', '.join(model.classes)}"
     semantics = model.semantics
-    answers = f"missing value: {semantics.missing or 'no class'}"
-    filled = len(stand_ins(model.variables))
-    if filled:
-        rest = len(model.inputs) - filled
-        more = f"; {answers.removeprefix('missing value: ')} for {rest}" if rest else ""
-        answers = f"missing value: replaced, see `missing as` of {filled} inputs{more}"
+    answers = f"missing value: {missing_text(model)}"
     if isinstance(model, RuleBase):
         answers += f"; no rule fires: {semantics.uncovered or 'no class'}"
         answers += f"; AND is {semantics.conjunction}; the first of the strongest wins"
     yield f"answers  {answers}"
+
+
+def missing_text(model: FuzzyTree | RuleBase) -> str:
+    """Return what becomes of a missing value."""
+    answer, filled = model.semantics.missing or "no class", stand_ins(model.variables)
+    if not filled:
+        return answer
+    rest = len(model.inputs) - len(filled)
+    more = f"; {answer} for {rest}" if rest else ""
+    return f"replaced, see `missing as` of {counted(len(filled), 'input')}{more}"
 
 
 def kind_text(model: FuzzyTree | RuleBase) -> str:

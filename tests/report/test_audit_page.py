@@ -296,6 +296,19 @@ def test_a_tree_is_drawn_with_the_rows_that_pass() -> None:
     assert "rows by class: 29" in text
 
 
+def test_the_head_says_that_a_missing_value_is_replaced() -> None:
+    tree = random_tree(1, combinations=0)
+    first, *others = tree.variables
+    filled = replace(tree, variables=(replace(first, missing=0.5), *others))
+    words = " ".join(Outline(page(audit_of(tree), filled)).words)
+    rest = len(tree.inputs) - 1
+    said = f"replaced, see `missing as` of 1 input; no class for {rest}"
+    assert f"; a missing value: {said}" in words
+    assert "; a missing value: no class" in " ".join(
+        Outline(page(audit_of(tree), tree)).words
+    )
+
+
 @pytest.mark.heavy
 def test_a_tree_of_many_leaves_is_printed_as_an_outline() -> None:
     tree = random_tree(3, leaves=210)
