@@ -300,12 +300,12 @@ def test_the_head_says_that_a_missing_value_is_replaced() -> None:
     tree = random_tree(1, combinations=0)
     first, *others = tree.variables
     filled = replace(tree, variables=(replace(first, missing=0.5), *others))
-    words = " ".join(Outline(page(audit_of(tree), filled)).words)
+    words = " ".join(Outline(page(audit_of(rule_base()), filled)).words)
     rest = len(tree.inputs) - 1
     said = f"replaced, see `missing as` of 1 input; no class for {rest}"
     assert f"; a missing value: {said}" in words
     assert "; a missing value: no class" in " ".join(
-        Outline(page(audit_of(tree), tree)).words
+        Outline(page(audit_of(rule_base()), tree)).words
     )
 
 

@@ -10,7 +10,7 @@ difference, boxes prove that there is none on the domain, or find it, or leave a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 import msgspec
@@ -26,6 +26,7 @@ from fuzzytree.auditing.engine.arrangement import (
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.equivalence import OF, difference_region, equivalence
+from fuzzytree.auditing.engine.probes import ends_of
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -344,14 +345,6 @@ def _clearest(one: IntArray, other: IntArray, margins: FloatArray) -> list[int]:
         if key not in best or margins[row] > margins[best[key]]:
             best[key] = row
     return list(best.values())
-
-
-def ends_of(domain: Domain, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
-    """Return the lower and upper ends of some inputs, each of shape (inputs, 1)."""
-    sides = [domain.side(name) for name in names]
-    low = [side.low if side else 0.0 for side in sides]
-    high = [side.high if side else 0.0 for side in sides]
-    return np.array(low)[:, None], np.array(high)[:, None]
 
 
 def inside(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -17,12 +17,13 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.diff.decisions import ends_of, inside, left_out, portions, union
+from fuzzytree.auditing.diff.decisions import inside, left_out, portions, union
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
 from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.probes import ends_of
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,

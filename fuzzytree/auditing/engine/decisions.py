@@ -58,7 +58,7 @@ class BoxBounds:
 
     def __init__(self, rules: RuleBase, domain: Domain) -> None:
         self.rules, self.inputs = rules, rules.inputs
-        self.low, self.high = ends_of(rules, domain)
+        self.low, self.high = ends_of(domain, rules.inputs)
         self.width = self.high - self.low
         self.variables = {variable.name: variable for variable in rules.variables}
         self.shapes = shapes_of(rules.variables)
@@ -333,7 +333,7 @@ class _Rivalry:
     def __init__(self, base: Arrangement, label: str | None) -> None:
         self.base = base
         self.is_own = np.array([rule.then == label for rule in base.rules.rules])
-        ends = ends_of(base.rules, base.domain)
+        ends = ends_of(base.domain, base.rules.inputs)
         reached = BoxBounds(base.rules, base.domain).reached(*ends)
         self.low, self.high = reached.low[:, 0], reached.high[:, 0]
         own = self.low[self.is_own]
@@ -385,7 +385,7 @@ class _Rivalry:
 
 def _drawn(base: Arrangement, label: str | None, values: FloatArray) -> Point | None:
     """Return a point that is decided otherwise, if one of some that are drawn is."""
-    low, high = ends_of(base.rules, base.domain)
+    low, high = ends_of(base.domain, base.rules.inputs)
     strengths = near_strengths(base.rules, np.clip(values, low, high))
     is_own = np.array([rule.then == label for rule in base.rules.rules])
     own = np.max(strengths, axis=0, where=is_own[:, np.newaxis], initial=0.0)

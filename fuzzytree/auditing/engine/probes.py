@@ -60,12 +60,12 @@ def near_strengths(rules: RuleBase, values: FloatArray) -> FloatArray:
     return strengths
 
 
-def ends_of(rules: RuleBase, domain: Domain) -> tuple[FloatArray, FloatArray]:
-    """Return the lower and upper ends of the inputs, each of shape (inputs, 1)."""
-    sides = [domain.side(name) for name in rules.inputs]
-    low = np.array([[0.0 if side is None else side.low] for side in sides])
-    high = np.array([[0.0 if side is None else side.high] for side in sides])
-    return low, high
+def ends_of(domain: Domain, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper ends of some inputs, each of shape (inputs, 1)."""
+    sides = [domain.side(name) for name in names]
+    low = [side.low if side else 0.0 for side in sides]
+    high = [side.high if side else 0.0 for side in sides]
+    return np.array(low)[:, None], np.array(high)[:, None]
 
 
 def drawn_in(base: Arrangement, count: int, seed: int = 0) -> FloatArray | None:
@@ -78,7 +78,7 @@ def drawn_in(base: Arrangement, count: int, seed: int = 0) -> FloatArray | None:
         Shape (inputs, count); about within the sides of combinations.
     """
     chance = np.random.default_rng(seed)
-    low, high = ends_of(base.rules, base.domain)
+    low, high = ends_of(base.domain, base.rules.inputs)
     values = low + chance.random((len(low), count)) * (high - low)
     limited = [
         (variable, side)
@@ -114,7 +114,7 @@ def leader(
     It is the best of some thousand points that were drawn, and nothing is claimed.
     """
     chance = np.random.default_rng([seed, *ours])
-    low, high = ends_of(base.rules, base.domain)
+    low, high = ends_of(base.domain, base.rules.inputs)
     mine, others = [n - 1 for n in ours], [n - 1 for n in rivals]
 
     def leads(points: FloatArray) -> FloatArray:
@@ -161,7 +161,7 @@ class RandomProbes(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     @functools.cached_property
     def _points(self) -> FloatArray:
-        low, high = ends_of(self.base.rules, self.base.domain)
+        low, high = ends_of(self.base.domain, self.base.rules.inputs)
         count = min(_MOST_POINTS, _MOST_STRENGTHS // len(self.base.rules.rules))
         steps = np.random.default_rng(self.seed).integers(
             0, _STEPS, size=(len(low), max(count, 1)), endpoint=True

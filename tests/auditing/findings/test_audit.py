@@ -20,6 +20,7 @@ from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.codes import AUDITED, CODES, FAMILIES
+from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import (
     LIMITS,
     Audit,
@@ -28,9 +29,13 @@ from fuzzytree.auditing.findings.records import (
     digest_of,
 )
 from fuzzytree.auditing.findings.subject import AuditRows, Material
+from fuzzytree.auditing.recheck import recheck
 from fuzzytree.errors import TableError
+from fuzzytree.exporters import yaml
 from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import FuzzyTree, Leaf
+from fuzzytree.report import page, sarif_text
+from fuzzytree.semantics import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
 from tests.auditing.findings.small_trees import one_cut, two_cuts
 from tests.cli.conftest import GRASPS, grip
@@ -92,6 +97,20 @@ def test_nothing_that_fails_is_found_in_a_fresh_tree(table: str) -> None:
         f"FT201 conflict: {why}",
         f"FT203 tree and raw rules differ: {raw}",
     ]
+
+
+@pytest.mark.parametrize("is_tree", [True, False])
+def test_a_model_of_one_leaf_is_audited_shown_and_decided_again(is_tree: bool) -> None:
+    tree = FuzzyTree("leaf", ("a", "b"), (), (), (Leaf("a", support=3),))
+    model = tree if is_tree else rules_from_tree(tree)
+    content = yaml.write(model).content
+    material = Material(model, model_file("leaf.yaml", content))
+    found = audit(material, selection=AuditSelection(ignore=["FT6"]))
+    assert (found.findings, found.is_complete) == ((), True)
+    report = recheck(msgspec.json.encode(found), content, ("audit", "leaf.yaml"))
+    assert report.wrong == []
+    assert "Nothing found" in page(found, model)
+    assert '"results": []' in sarif_text(found)
 
 
 def test_the_raw_rules_of_a_tree_are_compared_on_request() -> None:
