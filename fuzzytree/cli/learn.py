@@ -324,7 +324,8 @@ def _front_rows(small: Front | None) -> Lines:
     if small is None:
         return []
     heads, *lines = str(small).splitlines()
-    rows = [("choice", "columns a node", heads.removeprefix("leaves "))]
+    said = f"{heads.removeprefix('leaves ')}  unpruned, on other folds than accuracy"
+    rows = [("choice", "columns per node", said)]
     for place, line in enumerate(lines):
         if place == 0 or line[7:] != lines[place - 1][7:]:
             rows.append(("", f"{small.leaves[place]} leaves", line[7:]))
@@ -643,7 +644,8 @@ def _report_rows(
         rows.append(("merged", text, "no input distinguishes their classes"))
     if report.repairs:
         text = counted(report.sets, "set")
-        why = "; ".join(report.repairs) if is_verbose else "--verbose lists the reasons"
+        short = "fitted to rows that the paper's method does not expect; --verbose"
+        why = "; ".join(report.repairs) if is_verbose else short
         rows.append(("adjusted", text, why))
     return rows
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 
 import msgspec
 
@@ -106,7 +107,7 @@ def claim_text(claim: Claim) -> str:
     of = "" if claim.of == "rules" else f" of the {claim.of}"
     match claim.kind:
         case "strength":
-            return f"{mine}{of} has the strength {level}"
+            return f"{mine}{of} fires with strength {level}"
         case "beats":
             after = f" than {theirs}" if claim.rivals else " than any other"
             return f"{mine}{of} {is_} stronger{after}"
@@ -118,7 +119,8 @@ def claim_text(claim: Claim) -> str:
                 return f"{mine}{of} {'does' if is_ == 'is' else 'do'} not fire"
             return f"{mine}{of} {is_} below {level}"
         case "reaches":
-            return f"{mine}{of} {'reaches' if is_ == 'is' else 'reach'} {level}"
+            verb = "fires" if is_ == "is" else "fire"
+            return f"{mine}{of} {verb} with strength {level} or more"
         case "decides":
             named = "no class" if claim.label is None else repr(claim.label)
             verb = "decide" if claim.of in ("rules", "raw rules") else "decides"
@@ -139,14 +141,13 @@ def _rules(numbers: Sequence[int]) -> str:
 
 
 def _level(level: str | None) -> str:
-    """Return a number `p/q` in words: itself if short, near it if long."""
+    """Return a number `p/q` as a decimal; "about" says that it is rounded."""
     if level is None:
         return "?"
-    if len(level) <= 12:
-        return level
-    top, _, bottom = level.partition("/")
     try:
-        return f"about {number(int(top) / int(bottom or '1'))}"
+        exact = Fraction(level)
+        shown = number(float(exact))
+        return shown if Fraction(shown) == exact else f"about {shown}"
     except (ValueError, ZeroDivisionError, OverflowError):
         return level
 

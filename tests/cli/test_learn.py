@@ -50,7 +50,8 @@ def test_five_lines_report_what_happened(call: Call) -> None:
         "1.000), 0 s\n"
         "learnt   2 leaves depth 1, 1 of 1 columns, 0 s\n"
         "read     few.csv  12 rows, 1 column, 2 classes, 0 s\n"
-        "adjusted 2 sets   --verbose lists the reasons\n"
+        "adjusted 2 sets   fitted to rows that the paper's method does not expect; "
+        "--verbose\n"
         "wrote    few.yaml next: fuzzytree check few.yaml --data few.csv\n"
     )
     tree = ft.load("few.yaml")
@@ -93,7 +94,7 @@ def test_a_large_table_is_tested_on_a_sample(call: Call) -> None:
     Path("t.csv").write_text("\n".join(["a,b,grip", *lines, ""]), "utf-8")
     err = call("learn", "t.csv", "--target", "grip", "-o", "t.yaml")[2]
     assert re.sub(r", [0-9.]+ s$", "", err.splitlines()[0]) == (
-        "accuracy 1.000          cross-validated (majority class 0.500; 5 folds on "
+        "accuracy 1.000            cross-validated (majority class 0.500; 5 folds on "
         "20,000 of 21,000 rows: 1.000 to 1.000)"
     )
 

@@ -146,7 +146,7 @@ def test_every_part_of_a_finding_is_on_the_page() -> None:
         "fuzzytree audit grip.yaml --select FT101",
         "FT101-9f2c11ab",
         "the common level lies between 0.3 and 0.4; the budget was spent",
-        "rules 1, 2, 3, 4 are below 1/10",
+        "rules 1, 2, 3, 4 are below 0.1",
         "26/3",
         "8.666666666666666",
         "0x1.6800000000000p+6",
