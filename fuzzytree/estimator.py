@@ -141,7 +141,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     of each combination, and no training rows.
 
     Args:
-        mode: `default`, or `paper` for the paper's algorithm to the letter.
+        mode: `default`, or `paper` for the paper's algorithm without its step 7.
         columns_per_node: How many columns a node looks at, at most; 1 gives rules in
             the table's own words, None as many as help.
         leaves: How many leaves the tree has, at most.

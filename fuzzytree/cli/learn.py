@@ -96,7 +96,7 @@ class TreeOptions:
     heading: str = "Tree"
     mode: Any = option(
         "--mode",
-        "Learner: the default one, or that of the paper exactly.",
+        "Learner: the default one, or that of the paper without its step 7.",
         choices=["default", "paper"],
         default="default",
     )

@@ -61,7 +61,7 @@ def grow(
     rules: GrowthRules,
     progress: Callable[[float], None] | None = None,
 ) -> GrownTree:
-    """Return a tree with at most one leaf per pattern (steps 3 to 7)."""
+    """Return a tree with at most one leaf per pattern (steps 3 to 6)."""
     grown = GrownTree(Sketch())
     sketch = grown.sketch
     everything = np.flatnonzero(patterns.weights > 0).astype(np.int64)

@@ -20,8 +20,9 @@ class LearningSettings(
     """How a tree is learnt.
 
     Attributes:
-        mode: `paper` takes the paper to the letter: fuzzy patterns of the classes, one
-            feature a node, ties to the first feature. `default` scores each split by
+        mode: `paper` is the paper's algorithm without its step 7, the combination of
+            features: fuzzy patterns of the classes, one feature in a node, ties to the
+            first feature. `default` scores each split by
             the classes of the rows, and held-out rows prune the tree.
         columns_per_node: How many columns a node looks at, at most; 1 gives rules in
             the table's own words. None: as many as help.
