@@ -89,7 +89,7 @@ class Rest:
     3. The baseline of cells that nothing presses follows what they read. Where a cell
        reads less than its baseline by more than the threshold in 3 frames, one after
        another, the baseline goes down at once: what lay there when it was measured
-       has been lifted.
+       has left the cell. Cells that it still presses go on to show nothing.
     4. A cell that presses alone for `hot_s` seconds, without having been at rest in
        between, is hot. A cell is dead that never pressed while its neighbours on
        both sides did, in 3 placements. Both are masked.

@@ -80,6 +80,16 @@ def test_an_object_that_lay_there_at_the_beginning_is_seen_once_it_moves() -> No
     assert np.array_equal(last, BAR)
 
 
+def test_an_object_from_the_beginning_shows_new_cells_alone_until_it_has_left() -> None:
+    under = Sensor(SIDE, SIDE, threshold=4, baseline=tuple((20 + BAR).reshape(-1)))
+    rest = Rest(under)
+    shown(rest, [20 + BAR])
+    *_, near = shown(rest, [20 + np.roll(BAR, 1, axis=1)] * 50, 0.02)
+    assert np.array_equal(near, np.roll(BAR, 1, axis=1) * (BAR == 0))
+    *_, far = shown(rest, [20 + np.roll(BAR, 2, axis=1)] * 5, 1.02)
+    assert np.array_equal(far, np.roll(BAR, 2, axis=1))
+
+
 def test_a_tare_takes_the_median_of_the_next_frames() -> None:
     rest = Rest(SENSOR)
     rest.tare(5)
