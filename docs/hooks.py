@@ -19,8 +19,8 @@ from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.records import LIMITS
 from fuzzytree.cli.program import program
 from fuzzytree.exporters.table import all_formats
-from fuzzytree.model.contracts import Runtime
 from fuzzytree.model.options import options_of
+from fuzzytree.report.formats import promise_of
 from fuzzytree.runtimes.table import all_runtimes
 
 MARK = re.compile(r"<!-- generated: (\w+) -->")
@@ -97,17 +97,11 @@ def runtimes() -> Iterator[str]:
     rows = []
     for one in all_runtimes():
         runs, cannot = ", ".join(one.runs), "; ".join(one.cannot)
-        rows.append((one.name, runs, one.dtype, _promise(one), one.extra or "", cannot))
+        rows.append(
+            (one.name, runs, one.dtype, promise_of(one), one.extra or "", cannot)
+        )
     head = ("runtime", "runs", "numbers", "strengths", "extra", "cannot run")
     yield _table(head, rows)
-
-
-def _promise(runtime: Runtime) -> str:
-    if runtime.bound is not None or runtime.name == f"native {runtime.dtype}":
-        return "within a derived bound"
-    if runtime.dtype == "float64":
-        return "equal bits"
-    return f"equal bits with native {runtime.dtype}"
 
 
 def findings() -> Iterator[str]:

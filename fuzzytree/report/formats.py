@@ -66,12 +66,21 @@ def overview_lines(
     yield ""
     rows = [("runtime", "runs", "numbers", "agreement", "extra")]
     for run in runtimes:
-        promise = "equal bits" if run.bound is None else "within a derived bound"
-        extra = _extra(run.extra, missing)
-        rows.append((run.name, ", ".join(run.runs), run.dtype, promise, extra))
+        runs, extra = ", ".join(run.runs), _extra(run.extra, missing)
+        rows.append((run.name, runs, run.dtype, promise_of(run), extra))
     yield from aligned(rows)
+    yield "of systems with exp, powers and the like: within a derived bound"
     yield "cannot:"
     yield from _limits((one.name, one.cannot) for one in runtimes)
+
+
+def promise_of(runtime: Runtime) -> str:
+    """Return how the strengths of a runtime agree with those of the reference."""
+    if runtime.bound is not None or runtime.name == f"native {runtime.dtype}":
+        return "within a derived bound"
+    if runtime.dtype == "float64":
+        return "equal bits"
+    return f"equal bits with native {runtime.dtype}"
 
 
 def format_facts(one: Format, missing: set[str]) -> dict[str, object]:

@@ -58,6 +58,18 @@ def test_every_format_and_runtime_is_listed(call: Call) -> None:
             assert f"  {name}: {limit}" in out.splitlines()
 
 
+def test_equal_bits_are_promised_only_where_they_are_kept(call: Call) -> None:
+    lines = call("formats", "--verbose")[1].splitlines()
+    promises = {line.split("  ")[0]: " ".join(line.split()) for line in lines}
+    assert " equal bits -" in promises["native"]
+    assert " within a derived bound -" in promises["native mixed"]
+    assert " equal bits with native float32 -" in promises["c float32"]
+    text = (
+        "systems with exp, powers and the like: within a derived bound, not equal bits"
+    )
+    assert text in lines
+
+
 def test_formats_have_the_facts_as_json(call: Call) -> None:
     facts = json.loads(call("formats", "--json")[1])
     assert [one["name"] for one in facts["formats"]] == [*TABLE]
