@@ -69,20 +69,13 @@ def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
     table: Any = X
     if isinstance(X, np.ndarray) and X.dtype.kind != "c":  # which scikit-learn refuses
         table = numbers_only(X, "X")
-    elif hasattr(X, "__array__") and not isinstance(X, np.ndarray):
-        numbers_only(np.asarray(X), "X")  # a frame of times would become numbers
     return validate_data(estimator, table, *map(_sound_labels, y), **options)
 
 
 def _frame_of(X: Any) -> nw.DataFrame[Any] | None:
     """Return a frame, None for anything else, or if two columns have one name."""
-    table = X
-    if type(X).__name__ == "RecordBatch":
-        import pyarrow as pa
-
-        table = pa.Table.from_batches([X])
     try:
-        frame = nw.from_native(table, eager_only=True)
+        frame = nw.from_native(X, eager_only=True)
     except TypeError:
         return None
     return frame if len(set(frame.columns)) == len(frame.columns) else None
@@ -90,31 +83,22 @@ def _frame_of(X: Any) -> nw.DataFrame[Any] | None:
 
 def _as_numbers(
     frame: nw.DataFrame[Any],
-) -> tuple[Any, dict[str, tuple[str, ...]], tuple[str, ...]]:
-    """Return a frame to learn from with numbers in the place of all other cells.
+) -> tuple[FloatArray, dict[str, tuple[str, ...]], list[str]]:
+    """Return a frame to learn from as numbers, shape (rows, columns).
+
+    A column that is left out is 0.
 
     Returns:
-        The frame, the categories by column, and the columns of dates.
+        The numbers, the categories by column, and the columns of dates.
     """
-    types = zip(frame.columns, frame.schema.dtypes(), strict=True)
-    names = [name for name, kind in types if not kind.is_numeric()]
-    if not names:
-        return frame.to_native(), {}, ()
-    others = [name for name in frame.columns if name not in names]
-    some = frame.select([*names, *others[:1]]).to_native()  # all may be left out
-    table = read_table(some, target=np.zeros(len(frame)), name="X")
+    table = read_table(frame.to_native(), target=np.zeros(len(frame)), name="X")
     for column, text in table.remarks:
         warnings.warn(f"X: {column} has {text}", stacklevel=3)
-    values = dict.fromkeys(names, np.zeros(len(frame)))
-    values |= dict(zip(table.columns, table.values, strict=True))
-    numbers = [
-        nw.new_series(name, values[name], nw.Float64, backend=frame.implementation)
-        for name in names
-    ]
-    if hasattr(some, "index"):  # of pandas, which aligns columns by it
-        numbers = [nw.maybe_set_index(one, index=some.index) for one in numbers]
-    converted = frame.with_columns(*numbers).to_native()
-    return converted, dict(table.categories), table.dates
+    titles = {name.strip(): name for name in frame.columns}
+    values = np.zeros((len(titles), len(frame)))
+    values[[[*titles].index(name) for name in table.columns]] = table.values
+    categories = {titles[name]: texts for name, texts in table.categories.items()}
+    return values.T, categories, [titles[name] for name in table.dates]
 
 
 def _sound_labels(y: Any) -> Any:
@@ -210,9 +194,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         costs: Mapping[str, float] | None = None,
         class_weight: LabelWeight = None,
         seed: int = 0,
-        **unknown: Never,
+        **others: Never,
     ) -> None:
-        refuse_unknown("FuzzyTreeClassifier", unknown, self._get_param_names())
+        refuse_unknown("FuzzyTreeClassifier", others, self._get_param_names())
         self.mode = mode
         self.columns_per_node = columns_per_node
         self.leaves = leaves
@@ -270,17 +254,15 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 kept = np.flatnonzero(weights)
                 rows = [_safe_indexing(part, kept) for part in rows]
                 weights = weights[kept]
-        options: dict[str, Any] = {"dtype": np.float64}
-        options["ensure_all_finite"] = self._finite()
         categories: dict[str, tuple[str, ...]] = {}
-        dates: tuple[str, ...] = ()
+        dates: list[str] = []
         frame = _frame_of(rows[0])
         if frame is None:
-            values, labels = _validated(self, *rows, **options)
+            values, labels = _validated(self, *rows, **self._numeric())
         else:
             _validated(self, *rows, skip_check_array=True)
             table, categories, dates = _as_numbers(self._renamed(frame))
-            values, labels = check_X_y(table, rows[1], estimator=self, **options)
+            values, labels = check_X_y(table, rows[1], **self._numeric())
         check_classification_targets(labels)
         if len(values) == 1:
             raise ValueError("cannot learn from one sample (n_samples = 1)")
@@ -324,19 +306,13 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             )
         frame = _frame_of(X)
         for name, kind in frame.schema.items() if frame else ():
-            if isinstance(kind, nw.String | nw.Categorical | nw.Enum):
+            is_plain = isinstance(kind, nw.Boolean | nw.Object | nw.Unknown)
+            if not (is_plain or kind.is_numeric()):
                 raise ValueError(
-                    f"X: column {name!r} holds texts, whose categories only all rows "
-                    "show: call fit, or learn from parts with fuzzytree.Learner"
+                    f"X: column {name!r} holds no numbers ({kind}), and only all rows "
+                    "show what it is: call fit, or learn with fuzzytree.Learner"
                 )
-        values, labels = _validated(
-            self,
-            X,
-            y,
-            dtype=np.float64,
-            reset=is_first,
-            ensure_all_finite=self._finite(),
-        )
+        values, labels = _validated(self, X, y, reset=is_first, **self._numeric())
         check_classification_targets(labels)
         if is_first:
             if classes is None:
@@ -352,9 +328,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             weights = checked_weights(np.asarray(sample_weight), len(values))
         return self._learn(values, labels, weights)
 
-    def _finite(self) -> bool:
-        """Return whether scikit-learn refuses values that are not finite."""
-        return self.mode == "paper"
+    def _numeric(self) -> dict[str, Any]:
+        """Return which numbers scikit-learn's check takes."""
+        return {"dtype": np.float64, "ensure_all_finite": self.mode == "paper"}
 
     def __sklearn_tags__(self) -> Any:
         """Say that missing values and categories are learnt from, but in paper mode."""
@@ -557,27 +533,22 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     def _renamed(self, frame: nw.DataFrame[Any]) -> nw.DataFrame[Any]:
         """Return a frame whose columns have the names of the tree's."""
-        names = self._columns()
-        if frame.columns == names:
-            return frame
-        return frame.rename(dict(zip(frame.columns, names, strict=True)))
+        return frame.rename(dict(zip(frame.columns, self._columns(), strict=True)))
 
     def _values(self, X: npt.ArrayLike) -> FloatArray:
         """Return the columns that the tree needs, shape (inputs, rows)."""
         check_is_fitted(self)
-        options: dict[str, Any] = {"dtype": np.float64}
-        options["ensure_all_finite"] = self._finite()
         frame = _frame_of(X)
         if frame is None:
-            values = _validated(self, X, reset=False, **options)
-            rows = TableSource(values, self._columns())
+            rows: Any = _validated(self, X, reset=False, **self._numeric())
         else:
             _validated(self, X, reset=False, skip_check_array=True)
             rows = self._renamed(frame).to_native()
-        variables = self.tree_.variables
-        [part] = batches(rows, self.tree_.inputs, variables=variables, name="X")
+        table, variables = TableSource(rows, self._columns()), self.tree_.variables
+        [part] = batches(table, self.tree_.inputs, variables=variables, name="X")
         if frame is not None:
-            check_array(part.values.T, ensure_min_features=0, input_name="X", **options)
+            title: dict[str, Any] = {"input_name": "X", "ensure_min_features": 0}
+            check_array(part.values.T, **title, **self._numeric())
         return part.values
 
     def _answers(self, values: FloatArray, representation: ModelKind) -> Outcome:

@@ -122,7 +122,6 @@ _EMPTY = sorted({way(text) for text in MISSING for way in (str, str.upper, str.t
 _MISSING = f"(?i)^(?:{'|'.join(sorted(MISSING))})$"
 _DELIMITERS = (",", ";", "\t")
 _ARROW, _PARQUET = b"ARROW1", b"PAR1"
-_ARROW_TEXTS = ("string", "large_string", "string_view")
 _NO_DELIMITER = '"\r\n\0'
 
 
@@ -142,8 +141,7 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
         whole: All cells as one array of shape (columns, rows), where they are one.
         frame: The rows as a table of pyarrow, of a Parquet or Arrow file.
         share: How much of the bytes of all files was read by then; 0 if unknown.
-        texts: The columns whose type is text or category: to learn from, all their
-            cells are texts, whatever these look like.
+        texts: The columns whose type says that they hold texts or categories.
     """
 
     name: str
@@ -156,7 +154,7 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
     whole: FloatArray | None = None
     frame: object = None
     share: float = 0.0
-    texts: frozenset[str] = frozenset()
+    texts: Sequence[str] = ()
 
 
 class Table(msgspec.Struct, frozen=True, eq=False):
@@ -415,15 +413,12 @@ class LearningRows:
         ) -> tuple[
             TablePiece, FloatArray, list[_Column], FloatArray | None, _Coded | None
         ]:
-            if self._variables:
-                values, _ = _numbers_of(piece, chosen, self._variables)
-                numbers = (
-                    values,
-                    [(Contents(), dict[str, tuple[int, str]]())] * len(chosen),
-                )
-            else:
-                texts = self.categorical | piece.texts
-                numbers = _codes_of(piece, chosen, names, texts)
+            texts = {*self.categorical, *piece.texts}
+            numbers = (
+                (_numbers_of(piece, chosen, self._variables)[0], list[_Column]())
+                if self._variables
+                else _codes_of(piece, chosen, names, texts)
+            )
             weights = (
                 None if self._weight is None else _row_weights(piece, self._weight)
             )
@@ -436,7 +431,7 @@ class LearningRows:
         for piece, values, columns, weights, labels in itertools.chain(
             [read(first)], later
         ):
-            for name, (contents, examples) in zip(names, columns, strict=True):
+            for name, (contents, examples) in zip(names, columns, strict=False):
                 known = self.contents.setdefault(name, Contents())
                 self.contents[name] = known.merge(contents)
                 places = self.first.setdefault(name, {})
@@ -622,8 +617,8 @@ def batches(
             chosen = _needed_columns(piece, inputs, trained)
         values, unknown = _numbers_of(piece, chosen, wanted)
         extras = len(piece.columns) - len(chosen)
-        missing = _missing_cells(values) - sum(unknown.values())
-        yield Batch(values, missing, extras, piece, unknown)
+        missing = int(np.count_nonzero(~np.isfinite(values)))
+        yield Batch(values, missing - sum(unknown.values()), extras, piece, unknown)
 
 
 def in_order(function: Callable[[S], T], items: Iterable[S]) -> Generator[T]:
@@ -946,8 +941,8 @@ def columns_of(
         raise TableError("\n".join(shown) + "\n  " + text.format(*hints))
     chosen = tuple(names[place] for place in kept)
     if not chosen:
-        whys = "".join(f"\n  {name}: {text}" for name, text in remarks[:_MOST_NAMES])
-        raise TableError(f"{table} has no column to learn from{whys}")
+        lines = [f"\n  {name}: {text}" for name, text in remarks[:_MOST_NAMES]]
+        raise TableError(f"{table} has no column to learn from{''.join(lines)}")
     return LearntColumns(chosen, tuple(kept), categories, tuple(dates), tuple(remarks))
 
 
@@ -1031,16 +1026,12 @@ def _numbers_of(
 ) -> tuple[FloatArray, dict[str, int]]:
     """Return columns of a piece as the variables of a model take them.
 
-    Every reader of rows for a model uses it. The variable decides, whatever type the
-    column has: a cell of one with categories is the position of its category, of dates
-    its days, and any other a number.
-
-    Returns:
-        Shape (columns, rows), NaN where a cell is missing or no category; and by name,
-        how many cells are no category.
+    The variable decides, whatever the type of the column: a cell is the position of a
+    category, the days of a date, or a number. Also returns how many cells are no
+    category, by name; they are NaN.
 
     Raises:
-        TableError: If a column of numbers holds text; all such columns are named.
+        TableError: If a column of numbers holds text.
     """
     is_plain = not any(one.categories for one in variables)
     numbers = _all_numbers(piece, chosen) if is_plain else None
@@ -1083,10 +1074,6 @@ def _fault_text(faults: _Faults) -> str:
     if others > 0:
         shown[_MOST_NAMES:] = [f"and {counted(others, 'column')} more hold text"]
     return "\n".join(shown)
-
-
-def _missing_cells(values: FloatArray) -> int:
-    return sum(int(np.count_nonzero(~np.isfinite(row))) for row in values)
 
 
 def _shortened(text: str) -> str:
@@ -1413,7 +1400,7 @@ def _batch_pieces(
         titles = written or tuple(table.column_names)
         columns = _named(name, titles)
         cells: list[Cells] = [()] * len(columns)
-        texts: set[str] = set()
+        texts: list[str] = []
         places = {title: place for place, title in enumerate(titles)}
         for title, data in zip(table.column_names, table.columns, strict=True):
             place = places[title]
@@ -1421,19 +1408,13 @@ def _batch_pieces(
                 kind = data.type
                 is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
                 cells[place] = number_array(data) if is_number else data.to_pylist()
-                if pa.types.is_dictionary(kind) or str(kind) in _ARROW_TEXTS:
-                    texts.add(columns[place])
+                if str(kind).startswith(("string", "large_string", "dictionary")):
+                    texts.append(columns[place])
+        where, count = _row_names(name, first), table.num_rows
         yield TablePiece(
-            name,
-            columns,
-            (*cells,),
-            table.num_rows,
-            _row_names(name, first),
-            titles,
-            frame=table,
-            texts=frozenset(texts),
+            name, columns, (*cells,), count, where, titles, frame=table, texts=texts
         )
-        first += table.num_rows
+        first += count
 
 
 def _record_batches(
@@ -1635,7 +1616,7 @@ def _frame_piece(source: object, name: str, only: Only = None) -> TablePiece:
     columns = _named(name, written)
     there = dict(zip(map(str, frame.columns), frame.columns, strict=True))
     cells: list[Cells] = []
-    texts: set[str] = set()
+    texts: list[str] = []
     for title, column in zip(written, columns, strict=True):
         if title not in there or not (only is None or column in only):
             cells.append(())
@@ -1644,18 +1625,11 @@ def _frame_piece(source: object, name: str, only: Only = None) -> TablePiece:
         kind = series.dtype
         is_array = kind.is_numeric() or kind == nw.Datetime
         cells.append(series.to_numpy() if is_array else series.to_list())
-        if isinstance(kind, nw.String | nw.Categorical | nw.Enum):
-            native = getattr(series.to_native(), "dtype", None)
-            texts |= {column} if str(native) != "object" else set()
-    return TablePiece(
-        name,
-        columns,
-        tuple(cells),
-        len(frame),
-        _row_names(name),
-        written,
-        texts=frozenset(texts),
-    )
+        is_text = isinstance(kind, nw.String | nw.Categorical | nw.Enum)
+        if is_text and str(getattr(series.to_native(), "dtype", "")) != "object":
+            texts.append(column)
+    where = _row_names(name)
+    return TablePiece(name, columns, (*cells,), len(frame), where, written, texts=texts)
 
 
 def _row_names(name: str, first: int = 0) -> Callable[[int], str]:

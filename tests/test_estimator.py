@@ -346,13 +346,13 @@ def test_infinity_is_missing_but_in_paper_mode() -> None:
         FuzzyTreeClassifier(mode="paper").fit(values[:2], labels[:2])
 
 
-def test_partial_fit_refuses_texts() -> None:
+def test_partial_fit_refuses_categories() -> None:
     table = pd.DataFrame({"z": pd.Categorical([1, 2, 1, 2])})
-    with pytest.raises(ValueError, match="categories") as caught:
+    with pytest.raises(ValueError, match="no numbers") as caught:
         FuzzyTreeClassifier().partial_fit(table, [*"abab"], classes=["a", "b"])
     assert str(caught.value) == (
-        "X: column 'z' holds texts, whose categories only all rows show: call fit, or "
-        "learn from parts with fuzzytree.Learner"
+        "X: column 'z' holds no numbers (Categorical), and only all rows show what it "
+        "is: call fit, or learn with fuzzytree.Learner"
     )
 
 

@@ -86,7 +86,7 @@ def learn(
     units: Mapping[str, str] | None = None,
     settings: learning.LearningSettings | learning.SettingArguments | None = None,
     progress: Progress | None = None,
-    **named: Unpack[learning.SettingArguments],
+    **options: Unpack[learning.SettingArguments],
 ) -> FuzzyTree:
     """Learn a fuzzy tree from a table with a class for each row.
 
@@ -105,8 +105,8 @@ def learn(
         units: The units of columns, by name.
         settings: How to learn; the defaults of `LearningSettings` unless given.
         progress: Called with the current step and the share that is done.
-        named: Settings by their names, such as `leaves=4`, which go before `settings`;
-            see `LearningSettings`.
+        options: Settings by name, such as `leaves=4`, which go before `settings`; see
+            `LearningSettings`.
 
     Raises:
         TypeError: If there is no setting of a name.
@@ -130,7 +130,7 @@ def learn(
         >>> run(tree, np.array([[2.0], [7.0]])).classes
         ['soft', 'firm']
     """
-    chosen, engine = learning.settings_of(settings, named), engine_of(table)
+    chosen, engine = learning.settings_of(settings, options), engine_of(table)
     result: Table | learning.Learner
     if engine is not None:
         if weights is not None:
@@ -326,16 +326,9 @@ def _rows(
     with_others: bool = False,
 ) -> tuple[FloatArray, list[Batch]]:
     """Return rows for a model, of shape (inputs, rows), and as they came."""
-    is_system = isinstance(model, FuzzySystem)
+    variables, others = model.variables, with_others
     result = [
-        *batches(
-            data,
-            model.inputs,
-            trained=() if is_system else model.inputs,
-            name=name,
-            with_others=with_others,
-            variables=model.variables,
-        )
+        *batches(data, model.inputs, name=name, with_others=others, variables=variables)
     ]
     return _values(result), result
 

@@ -192,35 +192,21 @@ def settings_of(
 
     Raises:
         TypeError: If there is no setting of a name.
-        ValueError: As `LearningSettings`.
-
-    Example:
-        >>> settings_of({"leaves": 4, "seed": 1}, {"leaves": 5}).leaves
-        5
     """
     if not isinstance(settings, LearningSettings):
         arguments = {**(settings or {}), **arguments}
         settings = LearningSettings()
-    fields = LearningSettings.__struct_fields__
-    refuse_unknown("learn", arguments, fields, ("weights", "ignore", "name", "units"))
+    others = ("weights", "ignore", "name", "units")
+    refuse_unknown("learn", arguments, (*LearningSettings.__struct_fields__, *others))
     return msgspec.structs.replace(settings, **arguments)
 
 
-def refuse_unknown(
-    taker: str,
-    names: Iterable[str],
-    settings: Collection[str],
-    others: Iterable[str] = (),
-) -> None:
-    """Raise a TypeError for the first name that is no setting.
-
-    `others` are the names of what the taker takes besides.
-    """
+def refuse_unknown(taker: str, names: Iterable[str], fields: Collection[str]) -> None:
+    """Raise a TypeError for the first name that is none of the fields."""
     for name in names:
-        if name not in settings:
+        if name not in fields:
             close = OTHER_NAMES.get(name)
-            choice = name_choice(name, [*settings, *others])
-            choice = f"it is {close!r} here" if close else choice
+            choice = f"it is {close!r} here" if close else name_choice(name, fields)
             raise TypeError(f"{taker} has no setting {name!r}; {choice}")
 
 
