@@ -324,10 +324,11 @@ def categories_of(contents: Contents, numbers: Iterable[float] = ()) -> tuple[st
     """
     texts = {*(contents.texts or ()), *(BOOLEANS if contents.boolean else ())}
     texts |= {number_text(one + 0.0) for one in numbers if math.isfinite(one)}
-    return tuple(sorted(texts, key=_order))
+    return tuple(sorted(texts, key=text_order))
 
 
-def _order(text: str) -> tuple[bool, float, str]:
+def text_order(text: str) -> tuple[bool, float, str]:
+    """Return a key that sorts texts: whole numbers by size, then others by alphabet."""
     is_whole = re.fullmatch(r"0|-?[1-9][0-9]{0,14}", text) is not None
     return (not is_whole, float(text) if is_whole else 0.0, text)
 

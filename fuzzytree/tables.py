@@ -62,6 +62,7 @@ from fuzzytree.columns import (
     is_missing_code,
     placer,
     positions,
+    text_order,
 )
 from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, counted, number_array
 from fuzzytree.errors import MissingExtraError, TableError
@@ -740,12 +741,6 @@ def _class_name(value: object, *, is_whole: bool) -> str | None:
     return str(value)
 
 
-def class_order(label: str) -> tuple[bool, float, str]:
-    """Return a key that sorts classes: whole numbers by size, then other names."""
-    is_whole = re.fullmatch(r"0|-?[1-9][0-9]{0,14}", label) is not None
-    return (not is_whole, float(label) if is_whole else 0.0, label)
-
-
 class ClassLabels:
     """The classes of a table, numbered as they come.
 
@@ -779,7 +774,7 @@ class ClassLabels:
     def ordered(self) -> tuple[IntArray, tuple[str, ...]]:
         """Return the place of each number among the names in their order, and these."""
         names = [*self.names()]
-        order = sorted(set(names), key=class_order)
+        order = sorted(set(names), key=text_order)
         places = {name: place for place, name in enumerate(order)}
         return np.array([places[name] for name in names], np.int64), tuple(order)
 
