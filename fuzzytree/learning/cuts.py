@@ -395,7 +395,3 @@ class Sketch:
                 if len(inside):
                     todo.append((child, inside))
         return leaves
-
-    def classify(self, rows: FloatArray, start: int = 0) -> IntArray:
-        """Return the class that each row is given from a node on."""
-        return np.asarray(self.leaf_classes, np.int64)[self.descend(rows, start)]
