@@ -38,6 +38,7 @@ from .model import FuzzyTree as FuzzyTree
 from .model import RuleBase as RuleBase
 from .runtimes import Outputs as Outputs
 from .runtimes import Predictions as Predictions
+from .table_format import TableFormat as TableFormat
 from .tables import table as table
 
 __all__: list[str]

@@ -28,6 +28,9 @@ REAL = frozenset("biuf")
 NO_WEIGHT = "all weights are zero, and a row of weight zero is left out"
 """Why there is nothing to learn from."""
 
+EXACT = 2.0**53
+"""Below it each whole number is a double."""
+
 _NUMBERS = (bool, int, float, np.bool_, np.integer, np.floating)
 _NO_NUMBER = frozenset("cmMSV")  # complex, times, bytes
 _NUMBER = re.compile(

@@ -51,7 +51,6 @@ _DATE = re.compile(
     r"(?:[T ][0-9]{2}:[0-9]{2}(?::[0-9]{2}(?:\.[0-9]{1,9})?)?"
     r"(?:Z|[+-][0-9]{2}:?[0-9]{2})?)?"
 )
-_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 _MICROSECOND = datetime.timedelta(microseconds=1)
 _DAY = 86_400_000_000  # microseconds
@@ -119,9 +118,7 @@ class Contents(msgspec.Struct, frozen=True):
         if self.text:
             is_alone = not (self.date or (self.boolean and self.number))
             is_much = self.text >= _LEAST_SHARE * self.cells
-            texts = self.texts or ("",)
-            is_comma = not self.number and all(map(_COMMA.fullmatch, texts))
-            return "text" if is_alone and is_much and not is_comma else None
+            return "text" if is_alone and is_much else None
         if self.date:
             return None if self.number or self.boolean else "date"
         return "boolean" if self.boolean and not self.number else "number"
@@ -234,7 +231,7 @@ def text_of(value: object) -> str:
     if isinstance(value, str):
         text = value.strip()
         return text.title() if text.lower() in ("true", "false") else text
-    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+    if isinstance(value, float | np.floating):
         return number_text(float(value))
     return str(value)
 

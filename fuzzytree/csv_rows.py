@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from fuzzytree.cells import EXACT
 from fuzzytree.errors import TableError
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ class CsvRows(msgspec.Struct, frozen=True, eq=False):
     ) -> list[npt.NDArray[np.generic]] | None:
         """Return some columns as doubles; None if there is none, or another cell.
 
-        Every cell must be a finite number or missing.
+        Every cell must be missing or a number below `EXACT`.
 
         Args:
             width: How many cells a row has.
@@ -95,7 +96,7 @@ class CsvRows(msgspec.Struct, frozen=True, eq=False):
         except pa.ArrowInvalid:
             return None
         result = [number_array(column) for column in table.columns]
-        finite = sum(int(np.count_nonzero(np.isfinite(row))) for row in result)
+        finite = sum(int(np.count_nonzero(np.abs(row) < EXACT)) for row in result)
         known = sum(len(column) - column.null_count for column in table.columns)
         return result if finite == known else None
 
@@ -145,7 +146,7 @@ class CsvRows(msgspec.Struct, frozen=True, eq=False):
             )
             return self._error(int(starts[row]), text)
         if "UTF8" in str(error):
-            return TableError(f"{self.name}: is no UTF-8 text; save it as UTF-8")
+            return no_text(self.name)
         return TableError(f"{self.name}: broken CSV: {error}")
 
     def line_of(self, row: int) -> int:
@@ -229,6 +230,12 @@ class CsvRows(msgspec.Struct, frozen=True, eq=False):
         return TableError(f"{self.name}:{self._line_at(place)}: {text}")
 
 
+def no_text(name: str, encoding: str = "") -> TableError:
+    """Return that a file is no text of an encoding."""
+    text = f"{name}: is no {encoding.upper() or 'UTF-8'} text; save it as UTF-8, or"
+    return TableError(f"{text} pass its encoding, such as --encoding cp1252")
+
+
 def blocks(
     head: bytes, read: Callable[[int], bytes], mark: bytes, name: str
 ) -> Iterator[CsvRows]:
@@ -297,7 +304,10 @@ def number_array(column: pa.ChunkedArray) -> npt.NDArray[np.generic]:
         import pyarrow.compute as pc
 
         is_short = column.type == pa.float32()
-        column = column.cast(pa.float32() if is_short else pa.float64(), safe=False)
+        try:
+            column = column.cast(pa.float32() if is_short else pa.float64())
+        except pa.ArrowInvalid:  # doubles would round
+            return np.array(column.to_pylist(), np.object_)
         buffer = pa.py_buffer(np.array([math.nan]))
         nan = pa.Array.from_buffers(pa.float64(), 1, [None, buffer])[0]
         column = pc.call_function("coalesce", [column, nan.cast(column.type)])

@@ -3,8 +3,9 @@
 A table is a path, an open stream of CSV or Parquet, a pandas, polars or arrow table, a
 reader of record batches, or a numpy array. A path is a CSV, Parquet or Arrow file, a
 folder or a pattern of such files (`rows/*.csv`), or a place that pyarrow opens
-(`s3://place/rows.parquet`). Nothing is guessed: columns are found by their names, a
-number has a decimal point and no thousands separators. To learn from, a column holds
+(`s3://place/rows.parquet`); files may be compressed by gzip or zstd, or be of Excel.
+Nothing is guessed: columns are found by their names, a number has a decimal point and
+no thousands separators unless a `TableFormat` says so. To learn from, a column holds
 numbers, truth values, dates or texts, which its whole decides; a column of several
 kinds is an error that says where one stands. `fuzzytree.columns` says more.
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import codecs
 import contextlib
+import csv
 import difflib
 import functools
 import glob
@@ -24,6 +26,7 @@ import os
 import re
 import threading
 import time
+import zipfile
 from collections import Counter, deque
 from collections.abc import (
     Callable,
@@ -43,6 +46,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.cells import (
+    EXACT,
     MISSING,
     NO_WEIGHT,
     REAL,
@@ -62,10 +66,18 @@ from fuzzytree.columns import (
     is_missing_code,
     placer,
     positions,
+    text_of,
     text_order,
 )
-from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, counted, number_array
-from fuzzytree.errors import MissingExtraError, TableError
+from fuzzytree.csv_rows import (
+    BLOCK,
+    CsvRows,
+    blocks,
+    counted,
+    no_text,
+    number_array,
+)
+from fuzzytree.errors import MissingExtraError, TableError, install_hint
 from fuzzytree.files import LIMIT, check_stream, reason
 from fuzzytree.model import (
     DATE_UNIT,
@@ -75,6 +87,7 @@ from fuzzytree.model import (
     is_label,
     label_type_of,
 )
+from fuzzytree.table_format import TableFormat, number_hint
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,7 +106,10 @@ T = TypeVar("T")
 _Coded: TypeAlias = tuple[IntArray, list[tuple[str, bool]], str]
 _Faults = dict[str, tuple[str, str, int]]  # where the first is, its text, how many
 
-SUFFIXES = (".csv", ".parquet", ".pq", ".arrow", ".feather")
+SUFFIXES = (
+    *(".csv", ".csv.gz", ".csv.zst", ".xlsx"),
+    *(".parquet", ".pq", ".arrow", ".feather"),
+)
 """How the names of files end that are tables in a folder."""
 
 PIECE = 1 << 14
@@ -123,6 +139,21 @@ _EMPTY = sorted({way(text) for text in MISSING for way in (str, str.upper, str.t
 _MISSING = f"(?i)^(?:{'|'.join(sorted(MISSING))})$"
 _DELIMITERS = (",", ";", "\t")
 _ARROW, _PARQUET = b"ARROW1", b"PAR1"
+_KINDS = {
+    _ARROW: "arrow",
+    _PARQUET: "arrow",
+    b"PK\3\4": "excel",
+    b"\xd0\xcf\x11\xe0": "excel",  # of old
+    b"\x1f\x8b": "gzip",
+    b"\x28\xb5\x2f\xfd": "zstd",
+}
+_ENCODINGS = {
+    codecs.BOM_UTF32_LE: "utf-32",  # which begins like the next one
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+_WHOLE = re.compile("[+-]?[0-9]{1,400}")
+_MOST_EXCEL = 1 << 30  # bytes of the sheets of a file, uncompressed
 _NO_DELIMITER = '"\r\n\0'
 
 
@@ -227,7 +258,7 @@ class TableSource(msgspec.Struct, frozen=True, eq=False):
 
     source: object
     columns: Sequence[str] | None = None
-    delimiter: str | None = None
+    format: TableFormat = TableFormat()
     categorical: tuple[str, ...] = ()
 
 
@@ -235,7 +266,7 @@ def table(
     source: object,
     *,
     columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
+    format: TableFormat | None = None,
     categorical: Sequence[str] = (),
 ) -> TableSource:
     """Return a table for the functions that take one, with what it does not say.
@@ -244,27 +275,38 @@ def table(
         source: A path, an open file, a pandas, polars or arrow table, or an array of
             shape (rows, columns).
         columns: The names of an array's columns; x1, x2, ... unless given.
-        delimiter: Of a CSV file; the only one of `,` `;` and tab in its first line
-            unless given.
-        categorical: Columns to learn from whose cells are categories, numbers too.
+        format: How the table is written.
+        categorical: Columns whose cells are categories, numbers too: columns to learn
+            from, or the target.
 
     Example:
         >>> table(np.array([[1.5], [2.5]]), columns=["force"]).columns
         ['force']
     """
-    return TableSource(source, columns, delimiter, tuple(as_names(categorical)))
+    form = format or TableFormat()
+    return TableSource(source, columns, form, tuple(as_names(categorical)))
 
 
 def path_of(source: object) -> str | None:
     """Return the path of a table that is a file, None of another.
 
     Example:
-        >>> path_of(table("rows.csv", delimiter=";"))
+        >>> path_of(table("rows.csv", format=TableFormat(decimal=",")))
         'rows.csv'
     """
     if isinstance(source, TableSource):
         source = source.source
     return os.fspath(source) if isinstance(source, str | os.PathLike) else None
+
+
+def stem_of(path: str) -> str:
+    """Return the name of a table's file without its endings.
+
+    Example:
+        >>> stem_of("out/rows.csv.gz"), stem_of("rows.v2.csv")
+        ('rows', 'rows.v2')
+    """
+    return Path(re.sub(r"(?i)\.(?:gz|zst)$", "", path)).stem
 
 
 def read_table(
@@ -486,7 +528,8 @@ class LearningRows:
                 f"{len(self._weights)} weights for them"
             )
         for column, starts in self._counts.items():
-            if not starts:
+            is_empty = not self.contents[f"column {column + 1}"].cells
+            if not starts and not is_empty:
                 raise TableError(
                     f"{self.name}: column {column + 1} has no name\n  name it, or "
                     f"leave it out with ignore (--ignore 'column {column + 1}')"
@@ -558,7 +601,7 @@ class LearningRows:
         unnamed = [k for k in chosen if not first.written[k].strip()]
         self._counts = dict.fromkeys(unnamed, frozenset({0, 1}))
         self.names = tuple(first.columns[k] for k in chosen if k not in unnamed)
-        text = "no name and counts the rows; it is left out"
+        text = "no name and counts the rows, or is empty; it is left out"
         self.remarks = [*((first.columns[k], text) for k in unnamed), *trimmed(first)]
         return chosen
 
@@ -687,18 +730,33 @@ def pieces(
         TypeError: If the source is no table.
     """
     columns: Sequence[str] | None = None
-    delimiter: str | None = None
+    form, whole = TableFormat(), source
     while isinstance(source, TableSource):
         columns = source.columns if columns is None else columns
-        delimiter, source = delimiter or source.delimiter, source.source
+        form = source.format if form == TableFormat() else form
+        source = source.source
+    result = _pieces_as_written(source, columns, form, name, only)
+    if form.is_plain:
+        return result
+    texts = frozenset(_categorical_of(whole))
+    return (_with_plain_numbers(piece, form, texts) for piece in result)
+
+
+def _pieces_as_written(
+    source: object,
+    columns: Sequence[str] | None,
+    form: TableFormat,
+    name: str | None,
+    only: Only,
+) -> Iterator[TablePiece]:
     match source:
         case str() | os.PathLike():
             path = cast("str | os.PathLike[str]", source)
-            return _file_pieces(path, delimiter, name, only)
+            return _file_pieces(path, form, name, only)
         case io.TextIOBase():
-            return _text_pieces(source, name or "the table", delimiter, only)
+            return _text_pieces(source, name or "the table", form, only)
         case io.BufferedReader() | io.BytesIO():
-            return _stream_pieces(source, name or "the table", delimiter, only)
+            return _stream_pieces(source, name or "the table", form, only)
         case np.ndarray():
             array = cast("npt.NDArray[np.generic]", source)
             names = None if columns is None else as_names(columns)
@@ -712,6 +770,38 @@ def pieces(
             return _batch_pieces(parts, name or "the table", only)
         case _:
             return iter([_frame_piece(source, name or "the table", only=only)])
+
+
+def _with_plain_numbers(
+    piece: TablePiece, form: TableFormat, categorical: Collection[str]
+) -> TablePiece:
+    """Return a piece whose texts write numbers as usual.
+
+    Raises:
+        TableError: If a column that is not categorical has another number.
+    """
+    cells = [*piece.cells]
+    for place, (name, column) in enumerate(zip(piece.columns, cells, strict=True)):
+        if isinstance(column, np.ndarray) and column.dtype.kind in REAL:
+            continue
+        indices, values = distinct_values(column)
+        texts = [form.plain(one) if isinstance(one, str) else one for one in values]
+        others = [k for k, one in enumerate(values) if one is not None is texts[k]]
+        if others and name not in categorical:
+            row = int(np.isin(indices, others).argmax())
+            raise TableError(
+                f"{piece.where(row)}: column {name!r} holds {values[indices[row]]!r}, "
+                "and decimals stand behind a comma; pass --thousands . if the point "
+                f"groups digits, or --categorical {_quoted(name)} if it is a text"
+            )
+        for k in others:
+            texts[k] = values[k]
+        cells[place] = [texts[k] for k in indices]
+        if hasattr(column, "chunks"):
+            import pyarrow as pa
+
+            cells[place] = pa.chunked_array([cells[place]], pa.string())
+    return msgspec.structs.replace(piece, cells=(*cells,))
 
 
 def class_names(cells: Sequence[Cells]) -> list[str | None]:
@@ -905,8 +995,11 @@ def columns_of(
         if not held.cells and len(values[0]):
             remarks.append((name, "no value in any row; it is left out"))
             continue
-        if kind is None:
-            mixed[name] = _mixed_text(table, name, held, (first or {}).get(name, {}))
+        examples = (first or {}).get(name, {})
+        texts = held.texts or (examples.get("text", ("", ""))[1],)
+        hint = "" if is_declared else number_hint(texts)
+        if kind is None or hint:
+            mixed[name] = _mixed_text(table, name, held, examples, hint)
         elif kind == "text" and held.is_identifier(is_categorical=is_declared):
             count = "more than 10,000" if held.texts is None else len(held.texts)
             text = (
@@ -942,9 +1035,15 @@ def columns_of(
 
 
 def _mixed_text(
-    table: str, name: str, held: Contents, first: Mapping[str, tuple[str, str]]
+    table: str,
+    name: str,
+    held: Contents,
+    first: Mapping[str, tuple[str, str]],
+    hint: str,
 ) -> str:
-    """Return that the cells of a column do not go together."""
+    """Return that the cells of a column do not go together, or are other numbers."""
+    if hint:
+        return f"{first.get('text', (table,))[0]}: column {name!r} holds {hint}"
     counts = {
         "number": held.number,
         "truth value": held.boolean,
@@ -965,10 +1064,7 @@ def _mixed_text(
     if kind == "other cell":
         text = "no number, text, truth value or date"
     share = f" ({count:,} among {among})" if among else _more(count)
-    return (
-        f"{where}: column {name!r} holds {text}: "
-        f"{_shortened(example)!r}{_decimal_hint(example)}{share}"
-    )
+    return f"{where}: column {name!r} holds {text}: {_shortened(example)!r}{share}"
 
 
 _Column: TypeAlias = tuple[Contents, dict[str, tuple[int, str]]]
@@ -996,10 +1092,14 @@ def _codes_of(
         if isinstance(cells, np.ndarray) and cells.dtype.kind != "M":
             cells = numbers_only(cells, f"{piece.name}: column {name!r}")
         is_csv = len(cells) and not isinstance(cells, np.ndarray | Sequence)
+        parsed: FloatArray | None = None
         if is_csv and name not in categorical:
             parsed = _parsed([cast("pa.ChunkedArray", cells)])
-            cells = cells if parsed is None else parsed
-        values[row], contents, first = coded(cells, is_categorical=name in categorical)
+        values[row], contents, first = coded(
+            cells if parsed is None else parsed, is_categorical=name in categorical
+        )
+        if name not in categorical:
+            _refuse_rounded(piece, name, cells, values[row])
         examples = {kind: (place, str(cells[place])) for kind, place in first.items()}
         found.append((contents, examples))
     return values, found
@@ -1009,11 +1109,28 @@ def _all_numbers(piece: TablePiece, chosen: Sequence[int]) -> FloatArray | None:
     """Return columns that are all of numbers at once, None if there is another one."""
     if piece.whole is not None:
         is_all = list(chosen) == list(range(len(piece.columns)))
-        return piece.whole if is_all else piece.whole[list(chosen)]
+        values = piece.whole if is_all else piece.whole[list(chosen)]
+        return None if np.any(np.abs(values) >= EXACT) else values
     columns = [piece.cells[index] for index in chosen]
     is_csv = not any(isinstance(cells, np.ndarray | Sequence) for cells in columns)
     parsed = _parsed(columns) if columns and piece.rows and is_csv else None
-    return None if parsed is None else parsed.reshape(len(columns), piece.rows)
+    if parsed is None or np.any(np.abs(parsed) >= EXACT):
+        return None
+    return parsed.reshape(len(columns), piece.rows)
+
+
+def _refuse_rounded(
+    piece: TablePiece, name: str, cells: Cells, values: FloatArray
+) -> None:
+    """Raise a TableError if a column has a whole number that a double rounds."""
+    for row in np.flatnonzero(np.abs(values) >= EXACT).tolist():
+        text = str(cells[row]).strip()
+        if _WHOLE.fullmatch(text) and int(text) != float(values[row]):
+            raise TableError(
+                f"{piece.where(row)}: column {name!r} holds {text}, which a double "
+                f"rounds; pass --ignore {_quoted(name)} to leave the column out, or "
+                f"--categorical {_quoted(name)} to learn it as text"
+            )
 
 
 def _numbers_of(
@@ -1051,6 +1168,7 @@ def _numbers_of(
         if isinstance(cells, np.ndarray):
             cells = numbers_only(cells, f"{piece.name}: column {name!r}")
         values[row], bad = _numbers(cells)
+        _refuse_rounded(piece, name, cells, values[row])
         if bad:
             faults[name] = piece.where(bad[0]), str(cells[bad[0]]), len(bad)
     if faults:
@@ -1062,7 +1180,9 @@ def _fault_text(faults: _Faults) -> str:
     """Return a sentence for each column that holds text."""
     shown = [
         f"{where}: column {column!r} holds text where a number is needed: "
-        f"{_shortened(text)!r}{_decimal_hint(text)}{_more(count)}"
+        f"{_shortened(text)!r}{_more(count)}"
+        if not number_hint([text])
+        else f"{where}: column {column!r} holds {number_hint([text])}"
         for column, (where, text, count) in faults.items()
     ]
     others = len(shown) - _MOST_NAMES
@@ -1073,11 +1193,6 @@ def _fault_text(faults: _Faults) -> str:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
-
-
-def _decimal_hint(text: str) -> str:
-    is_comma = re.fullmatch(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?", text.strip())
-    return " (numbers are written with a decimal point)" if is_comma else ""
 
 
 def _more(count: int) -> str:
@@ -1202,7 +1317,19 @@ def _refuse_absent(piece: TablePiece, wanted: Sequence[str], why: str) -> None:
     hint = f" (did you mean {close[0]!r}?)" if close and len(absent) == 1 else ""
     word = "column" if len(absent) == 1 else "columns"
     names = ", ".join(map(repr, absent))
+    hint = _header_hint(piece.columns) or hint
     raise TableError(f"{piece.name} has no {word} {names}{why}; it has {known}{hint}")
+
+
+def _header_hint(columns: Sequence[str]) -> str:
+    """Return what reads a table whose first row is data, if it looks like that."""
+    numbers = sum(math.isfinite(number_of(c) or math.nan) for c in columns)
+    if 2 * numbers < len(columns):
+        return ""
+    return (
+        "\n  its first row looks like data; pass --no-header to name the columns "
+        "'column 1', 'column 2', ..."
+    )
 
 
 def _named(name: str, written: Sequence[str]) -> tuple[str, ...]:
@@ -1222,14 +1349,15 @@ def _refuse_repeated(name: str, columns: Sequence[str]) -> None:
         word = "column" if len(twice) == 1 else "columns"
         verb = "stands" if len(twice) == 1 else "stand"
         names = ", ".join(map(repr, twice))
-        raise TableError(f"{name}: {word} {names} {verb} there more than once")
+        text = f"{name}: {word} {names} {verb} there more than once"
+        raise TableError(text + _header_hint(columns))
 
 
 # --- files and streams
 
 
 def _file_pieces(
-    path: str | os.PathLike[str], delimiter: str | None, name: str | None, only: Only
+    path: str | os.PathLike[str], form: TableFormat, name: str | None, only: Only
 ) -> Iterator[TablePiece]:
     try:
         files = _files(os.fspath(path))
@@ -1243,7 +1371,7 @@ def _file_pieces(
         title = name if name and len(files) == 1 else file
         with _opened(file, title) as stream:
             try:
-                for piece in _stream_pieces(stream, title, delimiter, only):
+                for piece in _stream_pieces(stream, title, form, only):
                     first = first or piece
                     place = before + (stream.tell() if size else 0)
                     share = min(place / whole, 1.0)
@@ -1265,7 +1393,7 @@ def _files(path: str) -> list[str]:
         found = sorted(
             str(file)
             for file in Path(path).rglob("*")
-            if file.suffix.lower() in SUFFIXES and file.name[0] not in "._"
+            if file.name.lower().endswith(SUFFIXES) and file.name[0] not in "._"
         )
         if not found:
             known = ", ".join(SUFFIXES)
@@ -1302,6 +1430,8 @@ def _arranged(piece: TablePiece, first: TablePiece) -> TablePiece:
 
 
 def _opened(path: str, title: str) -> io.BufferedReader:
+    if path.lower().startswith(("http://", "https://", "ftp://")):
+        raise TableError(f"{title}: a URL is not read; download the table first")
     try:
         if "://" in path:
             return _fetched(path)
@@ -1324,41 +1454,110 @@ def _fetched(path: str) -> io.BufferedReader:
 
 
 def _stream_pieces(
-    stream: io.BufferedReader | io.BytesIO,
-    name: str,
-    delimiter: str | None,
-    only: Only,
+    stream: io.BufferedReader | io.BytesIO, name: str, form: TableFormat, only: Only
 ) -> Iterator[TablePiece]:
     head = stream.read(BLOCK)
-    if not head.startswith((_PARQUET, _ARROW)):
+    kind = next((kind for mark, kind in _KINDS.items() if head.startswith(mark)), "")
+    if not kind:
         if Path(name).suffix.lower() in (".parquet", ".pq"):
             what = "is no Parquet file: it must begin with PAR1"
             raise TableError(f"{name} {what if head else 'is empty'}")
-        yield from _csv_pieces(head, stream.read, name, delimiter, only)
+        yield from _csv_pieces(*_utf8(head, stream.read, form, name), name, form, only)
         return
     if stream.seekable():
         stream.seek(-len(head), io.SEEK_CUR)
+    else:
+        content = head + stream.read(LIMIT)
+        if len(content) > LIMIT:
+            raise TableError(
+                f"{name}: a binary table in a pipe is larger than {LIMIT} bytes; "
+                "write it to a file and name the file"
+            )
+        stream = io.BytesIO(content)
+    if kind == "arrow":
         yield from _arrow_pieces(stream, name, only)
-        return
-    content = head + stream.read(LIMIT)
-    if len(content) > LIMIT:
-        raise TableError(
-            f"{name}: a binary table in a pipe is larger than {LIMIT} bytes; "
-            "write it to a file and name the file"
-        )
-    yield from _arrow_pieces(io.BytesIO(content), name, only)
+    elif kind == "excel":
+        form = msgspec.structs.replace(form, delimiter=",")
+        rows = _excel_text(stream.read(LIMIT), name, form)
+        yield from _text_pieces(rows, name, form, only)
+    else:
+        import pyarrow as pa
+
+        stream = io.BufferedReader(pa.CompressedInputStream(stream, kind))
+        try:
+            yield from _stream_pieces(stream, name, form, only)
+        except OSError as error:
+            raise TableError(f"{name}: broken {kind} file: {reason(error)}") from error
+
+
+def _utf8(
+    head: bytes, read: Callable[[int], bytes], form: TableFormat, name: str
+) -> tuple[bytes, Callable[[int], bytes]]:
+    """Return the first bytes of a text and what reads more, in UTF-8."""
+    marks = (one for mark, one in _ENCODINGS.items() if head.startswith(mark))
+    encoding = form.encoding or next(marks, "utf-8")
+    try:
+        "".encode(encoding)  # which refuses what is no encoding of texts
+        decoder = codecs.getincrementaldecoder(encoding)()
+    except LookupError as error:
+        raise TableError(f"{name}: there is no encoding {encoding!r}") from error
+    if codecs.lookup(encoding).name == "utf-8":
+        return head, read
+
+    def read_on(size: int) -> bytes:
+        content = read(size)
+        return decoder.decode(content, final=len(content) < size).encode()
+
+    try:
+        return decoder.decode(head).encode(), read_on
+    except UnicodeDecodeError as error:
+        raise no_text(name, encoding) from error
+
+
+def _excel_text(content: bytes, name: str, form: TableFormat) -> io.StringIO:
+    """Return a sheet of an Excel file as CSV, without its empty rows."""
+    try:
+        import python_calamine as calamine
+    except ImportError as error:
+        hint = f"reading Excel needs {install_hint('excel')}"
+        raise MissingExtraError(f"{name}: {hint}") from error
+
+    try:
+        if content.startswith(b"PK"):
+            parts = zipfile.ZipFile(io.BytesIO(content)).infolist()
+            if sum(part.file_size for part in parts) > _MOST_EXCEL:
+                raise TableError(f"{name}: its sheets are too large; save them as CSV")
+        book = calamine.load_workbook(io.BytesIO(content))
+        names = [one for one in book.sheet_names if form.sheet in ("", one)]
+        sheets = {one: book.get_sheet_by_name(one).to_python() for one in names}
+    except (calamine.CalamineError, zipfile.BadZipFile) as error:
+        raise TableError(f"{name}: is no table of Excel: {error}") from error
+    sheets = {sheet: rows for sheet, rows in sheets.items() if rows}
+    if len(sheets) > 1 or not names:
+        known = ", ".join(map(repr, book.sheet_names))
+        raise TableError(f"{name} has the sheets {known}; pass --sheet and one of them")
+    text = io.StringIO()
+    for row in itertools.chain(*sheets.values()):
+        cells = [
+            text_of(cell).replace(".", form.decimal if isinstance(cell, float) else ".")
+            for cell in row
+        ]
+        if any(cells):
+            csv.writer(text).writerow(cells)
+    text.seek(0)
+    return text
 
 
 def _text_pieces(
-    text: io.TextIOBase, name: str, delimiter: str | None, only: Only
+    text: io.TextIOBase, name: str, form: TableFormat, only: Only
 ) -> Iterator[TablePiece]:
     def read(size: int) -> bytes:
         return text.read(size).encode(errors="surrogatepass")
 
     try:
-        yield from _csv_pieces(read(BLOCK), read, name, delimiter, only)
+        yield from _csv_pieces(read(BLOCK), read, name, form, only)
     except UnicodeDecodeError as error:
-        raise TableError(f"{name}: is no UTF-8 text; save it as UTF-8") from error
+        raise no_text(name, form.encoding or error.encoding) from error
 
 
 def _arrow_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[TablePiece]:
@@ -1494,7 +1693,7 @@ def _csv_pieces(
     head: bytes,
     read: Callable[[int], bytes],
     name: str,
-    delimiter: str | None,
+    form: TableFormat,
     only: Only,
 ) -> Iterator[TablePiece]:
     """Yield the rows of a CSV file, of which `head` has been read already."""
@@ -1503,7 +1702,7 @@ def _csv_pieces(
         first = re.split(rb"[\r\n]", head, maxsplit=1)[0].decode()
         if not first.strip():
             raise TableError(f"{name} is empty: it needs a line with column names")
-        mark = delimiter or _delimiter(first, name)
+        mark = form.delimiter or _delimiter(first, name)
         if len(mark) != 1 or mark in _NO_DELIMITER or not mark.isascii():
             raise TableError(
                 f"{name}: a delimiter is one character such as ';', "
@@ -1511,22 +1710,26 @@ def _csv_pieces(
             )
         result = blocks(head, read, mark.encode(), name)
         start = next(result)
-        parse = functools.partial(_rows_pieces, written=start.header(), only=only)
+        written = start.header()
+        if not form.header:
+            written = tuple(f"column {k}" for k in range(1, len(written) + 1))
+        parse = functools.partial(_rows_pieces, written=written, form=form, only=only)
         for parsed in in_order(parse, itertools.chain([start], result)):
             yield from parsed
     except UnicodeDecodeError as error:
-        raise TableError(f"{name}: is no UTF-8 text; save it as UTF-8") from error
+        raise no_text(name, form.encoding or error.encoding) from error
 
 
 def _rows_pieces(
-    rows: CsvRows, written: tuple[str, ...], only: Only
+    rows: CsvRows, written: tuple[str, ...], form: TableFormat, only: Only
 ) -> list[TablePiece]:
     """Return the rows of a block; at least one piece, if it is the first one."""
     columns = _named(rows.name, written)
+    only = only if form.header else None  # whose names are not those of the model
     wanted = [k for k, column in enumerate(columns) if only is None or column in only]
-    start = 1 if rows.line == 1 else 0  # the first row holds the names
+    start = int(rows.line == 1 and form.header)  # the row of the names
     numbers = None
-    if only is not None:
+    if only is not None and form.decimal == ".":
         numbers = rows.numbers(len(columns), wanted, start, _EMPTY)
     data: Sequence[Cells] = (
         rows.table(len(columns), wanted).slice(start).columns
@@ -1544,7 +1747,9 @@ def _rows_pieces(
             return f"{rows.name}:{rows.line_of(start + first + row)}"
 
         part = min(step, count - first)
-        result.append(TablePiece(rows.name, columns, (*cells,), part, where, written))
+        result.append(
+            TablePiece(rows.name, columns, (*cells,), part, where, written, form.header)
+        )
     return result
 
 
@@ -1619,6 +1824,8 @@ def _frame_piece(source: object, name: str, only: Only = None) -> TablePiece:
         series = frame.get_column(there[title])
         kind = series.dtype
         is_array = kind.is_numeric() or kind == nw.Datetime
+        if kind.is_integer() and series.null_count():  # which would be rounded
+            is_array = not (series.abs().max() or 0) >= EXACT
         cells.append(series.to_numpy() if is_array else series.to_list())
         is_text = isinstance(kind, nw.String | nw.Categorical | nw.Enum)
         if is_text and str(getattr(series.to_native(), "dtype", "")) != "object":

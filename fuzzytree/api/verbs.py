@@ -64,6 +64,7 @@ from fuzzytree.tables import (
     batches,
     class_names,
     path_of,
+    stem_of,
 )
 
 if TYPE_CHECKING:
@@ -206,7 +207,7 @@ def learn_table(
 
 def _name_of(table: object) -> str:
     path = path_of(table)
-    return (printable(Path(path).stem) if path else "") or "tree"
+    return (printable(stem_of(path)) if path else "") or "tree"
 
 
 def predict(frame: Frame, model: ModelSource) -> Frame:

@@ -20,10 +20,10 @@ from fuzzytree.cli.audit_options import (
 )
 from fuzzytree.cli.console import (
     FullResultOptions,
+    TableOptions,
     allow_loss_option,
     answer_styled,
     argument,
-    delimiter_option,
     flag,
     option,
     progress_bar,
@@ -51,7 +51,7 @@ For example:
 """
 
 
-class AuditOptions(FullResultOptions):
+class AuditOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -126,7 +126,6 @@ class AuditOptions(FullResultOptions):
         "--results FILE",
         "Result of `check --json` or `stability --json` to include (repeat).",
     )
-    delimiter: str | None = delimiter_option
     allow_loss: bool = allow_loss_option
 
 
@@ -178,7 +177,7 @@ def command(options: AuditOptions) -> int:
     with wrong_options(), progress_bar(quiet=options.quiet) as show:
         material = api.material(
             options.model,
-            data=table_of(options.data, options.delimiter),
+            data=table_of(options.data, options),
             target=options.target,
             results=options.results,
             allow_loss=options.allow_loss,

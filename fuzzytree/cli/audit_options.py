@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from fuzzytree.cli.console import say, setting, standard_input
+from fuzzytree.cli.console import (
+    TableOptions,
+    say,
+    setting,
+    standard_input,
+    table_format,
+    table_source,
+)
 
 if TYPE_CHECKING:
     from fuzzytree.auditing import AuditSettings, Configuration
@@ -94,14 +101,10 @@ def settings_of(
     return found
 
 
-def table_of(data: str | None, delimiter: str | None) -> object:
+def table_of(data: str | None, options: TableOptions) -> object:
     """Return a table by its path; standard input is read whole, to name its bytes."""
-    if data is None:
-        return None
-    from fuzzytree.tables import table
-
-    found = io.BytesIO(standard_input().read()) if data == "-" else data
-    return table(found, delimiter=delimiter)
+    whole = io.BytesIO(standard_input().read()) if data == "-" else data
+    return table_source(whole, options)
 
 
 _REPEATED = (
@@ -121,4 +124,6 @@ def repeating(context: click.Context) -> str:
             if one is not None and (name, one) != ("within", "model"):
                 said = one if isinstance(one, str) else repr(one).removesuffix(".0")
                 words += [option, said]
-    return shlex.join(words)
+    table = TableOptions()
+    vars(table).update(context.params)
+    return shlex.join([*words, *table_format(table).words()])

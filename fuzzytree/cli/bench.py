@@ -12,10 +12,10 @@ import click
 
 from fuzzytree.cli.console import (
     FullResultOptions,
+    TableOptions,
     answer,
     answer_json,
     argument,
-    delimiter_option,
     option,
     progress_bar,
     say,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 
 
-class BenchOptions(FullResultOptions):
+class BenchOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -81,7 +81,6 @@ class BenchOptions(FullResultOptions):
     plots: Sequence[str] = several(
         "--picture FILE", "Picture of the study, as .svg or .png (repeat)."
     )
-    delimiter: str | None = delimiter_option
 
 
 @click.command("bench", short_help="Measure error against run time.")
@@ -107,7 +106,7 @@ def command(options: BenchOptions) -> int:
     ):
         found = api.bench(
             options.model,
-            data=table_source(options.data, options.delimiter),
+            data=table_source(options.data, options),
             select=options.select,
             skip=options.skip,
             settings=BenchSettings(

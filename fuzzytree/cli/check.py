@@ -8,11 +8,11 @@ import click
 
 from fuzzytree.cli.console import (
     FullResultOptions,
+    TableOptions,
     allow_loss_option,
     answer_result,
     argument,
     data_option,
-    delimiter_option,
     flag,
     option,
     progress_bar,
@@ -24,7 +24,7 @@ from fuzzytree.cli.console import (
 )
 
 
-class CheckOptions(FullResultOptions):
+class CheckOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -36,7 +36,6 @@ class CheckOptions(FullResultOptions):
         "Most rows to generate; 20000 by default, 2000 for a fuzzy system.",
         type=click.IntRange(min=1),
     )
-    delimiter: str | None = delimiter_option
     rows_only: bool = rows_only_option
     run_code: bool = flag(
         "--run-code", "Run a program file although its text differs from a new one."
@@ -62,7 +61,7 @@ def command(options: CheckOptions) -> int:
         found = api.check(
             options.model,
             *options.files,
-            data=table_source(options.data, options.delimiter),
+            data=table_source(options.data, options),
             runtimes=options.runtimes or None,
             settings=CheckSettings(
                 limit=options.limit,

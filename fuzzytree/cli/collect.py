@@ -12,10 +12,10 @@ import click
 
 from fuzzytree.cli.console import (
     ResultOptions,
+    TableOptions,
     answer_json,
     argument,
     categorical_option,
-    delimiter_option,
     ignore_option,
     missing_option,
     option,
@@ -36,7 +36,7 @@ STATE = ".state"
 """How the name of a state's file ends."""
 
 
-class CollectOptions(ResultOptions):
+class CollectOptions(TableOptions, ResultOptions):
     """The arguments and options of the verb."""
 
     parts: Sequence[str] = argument("PART...", nargs=-1, required=True)
@@ -55,7 +55,6 @@ class CollectOptions(ResultOptions):
     categorical: Sequence[str] = categorical_option
     rows_per_class: int | None = rows_per_class_option
     missing: str | None = missing_option
-    delimiter: str | None = delimiter_option
 
 
 @click.command("collect", short_help="Collect what learning needs of parts of a table.")
@@ -86,7 +85,7 @@ def command(options: CollectOptions) -> None:
         learner = _learner(options) if options.model is None else _counts(options)
         for part in options.parts:
             title = "standard input" if part == "-" else None
-            source = table_source(part, options.delimiter)
+            source = table_source(part, options)
             learner.update(source, name=title, progress=show)
         digest = learner.save(options.output)
     seconds = time.perf_counter() - begin

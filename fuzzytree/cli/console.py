@@ -18,6 +18,8 @@ from fuzzytree.model import printable, printable_json, printable_lines
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+    from fuzzytree.table_format import TableFormat
+
 Name = TypeVar("Name", str, str | None)
 Record = TypeVar("Record")
 Code = TypeVar("Code", int, None, int | None)
@@ -51,7 +53,7 @@ def option(
     if choices:
         about["type"] = click.Choice(choices)
     if default is not None:
-        about |= {"default": default, "show_default": True}
+        about |= {"default": default, "show_default": default != ""}
     return functools.partial(click.option, *names, help=help, **about)
 
 
@@ -149,10 +151,40 @@ class FullResultOptions(ResultOptions):
     verbose: bool = verbose_option
 
 
-delimiter_option = option(
-    "--delimiter CHARACTER",
-    "Character between the cells of a CSV file; by default from its first line.",
-)
+class TableOptions:
+    """The options of a verb that reads a table: how it is written."""
+
+    heading: str = "Table"
+
+    delimiter: str = option(
+        "--delimiter CHARACTER",
+        "Character between the cells of a CSV file; by default from its first line.",
+        default="",
+    )
+    decimal: str = option(
+        "--decimal CHARACTER",
+        "Character before the decimals of a number: `.` or `,`.",
+        default=".",
+    )
+    thousands: str = option(
+        "--thousands CHARACTER",
+        "Character that groups the digits of a number: `,` `.` `'` or a blank.",
+        default="",
+    )
+    percent: bool = flag("--percent", "Read 104% as the number 1.04.")
+    encoding: str = option(
+        "--encoding NAME",
+        "Encoding of a CSV file; UTF-8, or UTF-16 if it says so, by default.",
+        default="",
+    )
+    header: bool = flag(
+        "--no-header",
+        "Read the first row of a table as data; the columns are `column 1`, ...",
+        flag_value=False,
+        default=True,
+    )
+    sheet: str = option("--sheet NAME", "Sheet of an Excel file to read.", default="")
+
 
 ignore_option = several("--ignore COLUMN", "Column that is no input (repeat).")
 
@@ -260,16 +292,30 @@ def answer_bytes(content: bytes) -> None:
     sys.stdout.buffer.flush()
 
 
+def table_format(options: TableOptions) -> TableFormat:
+    """Return how a table is written.
+
+    Raises:
+        click.UsageError: If no table is written so.
+    """
+    from fuzzytree.table_format import TableFormat
+
+    with wrong_options():
+        return TableFormat(
+            **{name: getattr(options, name) for name in TableFormat.__struct_fields__}
+        )
+
+
 def table_source(
-    name: str | None, delimiter: str | None = None, categorical: Sequence[str] = ()
+    name: object, options: TableOptions, categorical: Sequence[str] = ()
 ) -> object:
-    """Return where to read a table: behind `-` is standard input."""
-    found = standard_input() if name == "-" else name
-    if delimiter is None and not categorical:
-        return found
+    """Return where to read a table, None without one; `-` is standard input."""
+    if name is None:
+        return None
     from fuzzytree.tables import table
 
-    return table(found, delimiter=delimiter, categorical=categorical)
+    source = standard_input() if name == "-" else name
+    return table(source, format=table_format(options), categorical=categorical)
 
 
 def standard_input() -> BinaryIO:

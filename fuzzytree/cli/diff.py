@@ -9,10 +9,10 @@ import click
 from fuzzytree.cli.audit_options import limits_of
 from fuzzytree.cli.console import (
     FullResultOptions,
+    TableOptions,
     allow_loss_option,
     answer_result,
     argument,
-    delimiter_option,
     option,
     progress_bar,
     several,
@@ -22,7 +22,7 @@ from fuzzytree.cli.console import (
 )
 
 
-class DiffOptions(FullResultOptions):
+class DiffOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
     old: str = argument("OLD")
@@ -36,7 +36,6 @@ class DiffOptions(FullResultOptions):
     budget: float = option(
         "--budget SECONDS", "Time limit of the proofs in seconds.", default=60.0
     )
-    delimiter: str | None = delimiter_option
     allow_loss: bool = allow_loss_option
 
 
@@ -59,7 +58,7 @@ def command(options: DiffOptions) -> int:
         found = api.diff(
             options.old,
             options.new,
-            data=table_source(options.data, options.delimiter),
+            data=table_source(options.data, options),
             limits=limits_of(options.limits),
             budget_s=options.budget,
             allow_loss=options.allow_loss,

@@ -15,11 +15,11 @@ import msgspec
 from fuzzytree.cli.collect import STATE
 from fuzzytree.cli.console import (
     Sections,
+    TableOptions,
     answer_bytes,
     answer_json,
     argument,
     categorical_option,
-    delimiter_option,
     flag,
     ignore_option,
     missing_option,
@@ -28,6 +28,7 @@ from fuzzytree.cli.console import (
     rows_per_class_option,
     say_rows,
     several,
+    table_format,
     table_source,
     takes,
     wrong_options,
@@ -62,8 +63,8 @@ FEW_GROUPS = 10
 """Groups of a class below which its accuracy says little."""
 
 
-class TableOptions:
-    """The options of the table."""
+class TableAndColumns(TableOptions):
+    """The options of the table, and of its columns."""
 
     heading: str = "Table"
     target: str | None = option(
@@ -87,7 +88,6 @@ class TableOptions:
         "--cost COLUMN=COST", "Cost of computing a column (repeat)."
     )
     missing: str | None = missing_option
-    delimiter: str | None = delimiter_option
 
 
 class TreeOptions:
@@ -179,7 +179,7 @@ class OutputOptions(RepresentationOptions):
     )
 
 
-class LearnOptions(TableOptions, TreeOptions, PaperOptions, OutputOptions):
+class LearnOptions(TableAndColumns, TreeOptions, PaperOptions, OutputOptions):
     """The arguments and options of the verb."""
 
     tables: Sequence[str] = argument("TABLE", nargs=-1, required=True)
@@ -400,7 +400,7 @@ def _write(
         return
     write_atomically(options.output, content)
     rest = ["--data", options.tables[0]] if is_data else []
-    rest += ["--delimiter", options.delimiter] if rest and options.delimiter else []
+    rest += table_format(options).words() if rest else []
     written = _written_rows(model, options.output, form, rest)
     say_rows(*written, width=width, quiet=is_silent)
 
@@ -440,7 +440,7 @@ def _read(
     if options.target is None:
         raise click.UsageError("name the column of the classes with --target")
     return read_or_collect(
-        table_source(options.tables[0], options.delimiter, options.categorical),
+        table_source(options.tables[0], options, options.categorical),
         target=options.target,
         weights=options.weight,
         ignore=options.ignore,
@@ -478,8 +478,10 @@ def _title(options: LearnOptions) -> str:
     """Return the name of the tree."""
     if options.name:
         return options.name
+    from fuzzytree.tables import stem_of
+
     is_named = len(options.tables) == 1 and options.tables[0] != "-"
-    return (printable(Path(options.tables[0]).stem) if is_named else "") or "tree"
+    return (printable(stem_of(options.tables[0])) if is_named else "") or "tree"
 
 
 def _model_file(output: str, form: Format) -> str:

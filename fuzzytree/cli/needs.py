@@ -9,11 +9,11 @@ import click
 
 from fuzzytree.cli.console import (
     FullResultOptions,
+    TableOptions,
     answer,
     answer_json,
     argument,
     data_option,
-    delimiter_option,
     option,
     progress_bar,
     say,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from fuzzytree.model import Use
 
 
-class NeedsOptions(FullResultOptions):
+class NeedsOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -54,7 +54,6 @@ class NeedsOptions(FullResultOptions):
         "Time in seconds for measuring loading, prediction and reading.",
         type=click.FloatRange(min=0.0, min_open=True),
     )
-    delimiter: str | None = delimiter_option
 
 
 @click.command("needs", short_help="Report what a model needs, and leave out the rest.")
@@ -86,16 +85,14 @@ def command(options: NeedsOptions) -> int:
         )
     if options.output is not None:
         check_place(options.output)
-    rows = api.rows_of(table_source(options.data, options.delimiter), first)
+    rows = api.rows_of(table_source(options.data, options), first)
     with progress_bar(quiet=options.quiet) as show:
         report = benchmarking.report(
             first,
             found,
             uses=wanted,
             data=rows,
-            table=None
-            if options.data == "-"
-            else table_source(options.data, options.delimiter),
+            table=None if options.data == "-" else table_source(options.data, options),
             budget_s=options.budget or 0.0,
             progress=show,
         )

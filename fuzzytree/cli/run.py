@@ -16,9 +16,9 @@ import click
 import msgspec
 
 from fuzzytree.cli.console import (
+    TableOptions,
     allow_loss_option,
     argument,
-    delimiter_option,
     flag,
     option,
     progress_bar,
@@ -56,7 +56,7 @@ _BINARY = (".parquet", ".pq", ".arrow", ".feather")  # files that are no text
 _GROUP = 1 << 26  # bytes of rows that a binary file gets at a time
 
 
-class RunOptions:
+class RunOptions(TableOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -80,7 +80,6 @@ class RunOptions:
     runtime: str | None = option(
         "--runtime NAME", "Runtime that executes the model; native by default."
     )
-    delimiter: str | None = delimiter_option
     as_json: bool = flag(
         "--json", "Write JSON lines in place of CSV; null for an empty cell."
     )
@@ -133,7 +132,7 @@ def command(options: RunOptions) -> None:
             with_strengths=is_weighed,
             with_probabilities=options.probabilities,
         )
-    source = table_source(options.table, options.delimiter)
+    source = table_source(options.table, options)
     name = "standard input" if options.table == "-" else options.table
     finish = _part_maker(options, name, reason, is_binary=is_binary)
     tally, begin = _Tally(_has_status(found)), time.monotonic()

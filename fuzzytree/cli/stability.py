@@ -8,10 +8,10 @@ import click
 
 from fuzzytree.cli.console import (
     FullResultOptions,
+    TableOptions,
     answer_result,
     argument,
     data_option,
-    delimiter_option,
     progress_bar,
     runtimes_option,
     several,
@@ -21,7 +21,7 @@ from fuzzytree.cli.console import (
 )
 
 
-class StabilityOptions(FullResultOptions):
+class StabilityOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -30,7 +30,6 @@ class StabilityOptions(FullResultOptions):
         "--select CODE", "Check to apply, such as N3 (repeat); all by default."
     )
     runtimes: Sequence[str] = runtimes_option
-    delimiter: str | None = delimiter_option
 
 
 @click.command("stability", short_help="Check that a model is numerically stable.")
@@ -48,7 +47,7 @@ def command(options: StabilityOptions) -> int:
     with wrong_options(), progress_bar(quiet=options.quiet) as show:
         found = api.stability(
             options.model,
-            data=table_source(options.data, options.delimiter),
+            data=table_source(options.data, options),
             select=options.select,
             runtimes=options.runtimes or None,
             progress=show,
