@@ -99,13 +99,22 @@ def check_places(written: Iterable[PathLike], read: Iterable[PathLike] = ()) -> 
     Raises:
         WriteError: If one cannot be written, is read as well, or stands twice.
     """
-    taken = {os.path.realpath(path): "it is read as well" for path in read}
+    taken = {_identity(path): "it is read as well" for path in read}
     for path in written:
         check_place(path)
-        key, name = os.path.realpath(path), os.fspath(path)
+        key, name = _identity(path), os.fspath(path)
         if key in taken and (Path(path).is_file() or not Path(path).exists()):
             raise WriteError(f"{name}: cannot be written: {taken[key]}")
         taken[key] = "another output goes there"
+
+
+def _identity(path: PathLike) -> object:
+    """Return what two names of one file share, links among them."""
+    try:
+        found = Path(path).stat()
+    except (OSError, ValueError):
+        return os.path.realpath(path)
+    return found.st_dev, found.st_ino
 
 
 @contextlib.contextmanager

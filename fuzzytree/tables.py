@@ -1099,7 +1099,9 @@ def _codes_of(
             cells if parsed is None else parsed, is_categorical=name in categorical
         )
         if name not in categorical:
-            _refuse_rounded(piece, name, cells, values[row])
+            column = _quoted(name)
+            hint = f"; pass --ignore {column}, or --categorical {column} to learn text"
+            _refuse_rounded(piece, name, cells, values[row], hint)
         examples = {kind: (place, str(cells[place])) for kind, place in first.items()}
         found.append((contents, examples))
     return values, found
@@ -1120,7 +1122,7 @@ def _all_numbers(piece: TablePiece, chosen: Sequence[int]) -> FloatArray | None:
 
 
 def _refuse_rounded(
-    piece: TablePiece, name: str, cells: Cells, values: FloatArray
+    piece: TablePiece, name: str, cells: Cells, values: FloatArray, hint: str = ""
 ) -> None:
     """Raise a TableError if a column has a whole number that a double rounds."""
     for row in np.flatnonzero(np.abs(values) >= EXACT).tolist():
@@ -1128,8 +1130,7 @@ def _refuse_rounded(
         if _WHOLE.fullmatch(text) and int(text) != float(values[row]):
             raise TableError(
                 f"{piece.where(row)}: column {name!r} holds {text}, which a double "
-                f"rounds; pass --ignore {_quoted(name)} to leave the column out, or "
-                f"--categorical {_quoted(name)} to learn it as text"
+                f"rounds{hint}"
             )
 
 
@@ -1360,7 +1361,7 @@ def _file_pieces(
     path: str | os.PathLike[str], form: TableFormat, name: str | None, only: Only
 ) -> Iterator[TablePiece]:
     try:
-        files = _files(os.fspath(path))
+        files = files_of(os.fspath(path))
     except OSError as error:
         raise TableError(f"{path}: cannot be read: {reason(error)}") from error
     first: TablePiece | None = None
@@ -1381,7 +1382,7 @@ def _file_pieces(
         before += size
 
 
-def _files(path: str) -> list[str]:
+def files_of(path: str) -> list[str]:
     """Return the files of a path: one, those of a folder, or those of a pattern.
 
     Raises:

@@ -330,13 +330,11 @@ def test_excel_without_its_library_names_the_package(
 )
 def test_a_whole_number_that_a_double_rounds_is_refused(source: object) -> None:
     place = "t.csv:3" if isinstance(source, io.BytesIO) else "t.csv, row 2"
-    message = (
-        f"{place}: column 'id' holds 9007199254740993, which a double rounds; pass "
-        "--ignore id to leave the column out, or --categorical id to learn it as text"
-    )
+    message = f"{place}: column 'id' holds 9007199254740993, which a double rounds"
+    hint = "; pass --ignore id, or --categorical id to learn text"
     with pytest.raises(TableError) as caught:
         read_table(source, target="grip", name="t.csv")
-    assert str(caught.value) == message
+    assert str(caught.value) == message + hint
     if isinstance(source, io.BytesIO):
         source.seek(0)
     with pytest.raises(TableError) as caught:

@@ -1,3 +1,4 @@
+from .console import OUTPUT as OUTPUT
 from .console import ResultOptions as ResultOptions
 from .console import answer as answer
 from .console import answer_bytes as answer_bytes
@@ -6,6 +7,7 @@ from .console import argument as argument
 from .console import flag as flag
 from .console import json_option as json_option
 from .console import option as option
+from .console import output_option as output_option
 from .console import progress_bar as progress_bar
 from .console import quiet_option as quiet_option
 from .console import rows_only_option as rows_only_option

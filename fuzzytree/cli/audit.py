@@ -26,13 +26,14 @@ from fuzzytree.cli.console import (
     argument,
     flag,
     option,
+    output_option,
     progress_bar,
     say,
     several,
     takes,
     wrong_options,
 )
-from fuzzytree.files import check_places, write_atomically
+from fuzzytree.files import write_atomically
 from fuzzytree.model import printable, printable_json
 
 if TYPE_CHECKING:
@@ -97,9 +98,9 @@ class AuditOptions(TableOptions, FullResultOptions):
         "File with options; by default fuzzytree-audit.yaml of this folder.",
     )
     baseline: str | None = option(
-        "--baseline FILE", "File of accepted findings, which do not fail the audit."
+        "--baseline ACCEPTED", "File of accepted findings, which do not fail the audit."
     )
-    write_baseline: str | None = option(
+    write_baseline: str | None = output_option(
         "--write-baseline FILE", "File to write all findings to, for --baseline."
     )
     fail_on: FailOn | None = option(
@@ -116,10 +117,10 @@ class AuditOptions(TableOptions, FullResultOptions):
     is_whole: bool = flag(
         "--all", "List every answer, also those that are no findings."
     )
-    output: str | None = option(
+    output: str | None = output_option(
         "-o --output FILE", "File to write the result to, in place of stdout."
     )
-    page: str | None = option(
+    page: str | None = output_option(
         "--page FILE", "HTML file to write the audit to, in addition."
     )
     results: tuple[str, ...] = several(
@@ -162,15 +163,6 @@ def command(options: AuditOptions) -> int:
     output = None if options.output == "-" else options.output
     if "-" in (options.page, options.write_baseline):
         raise click.UsageError("`-` is stdout, where the findings go; name a file")
-    read = [
-        one
-        for one in (options.model, options.data, options.config, *options.results)
-        if one is not None
-    ]
-    places = [
-        one for one in (output, options.page, options.write_baseline) if one is not None
-    ]
-    check_places(places, read)
     known = configured(options.config, quiet=options.quiet)
     path = options.baseline or known.baseline
     accepted: Mapping[str, str] = {} if path is None else read_baseline(path)

@@ -17,6 +17,7 @@ from fuzzytree.cli.console import (
     answer_json,
     argument,
     option,
+    output_option,
     progress_bar,
     say,
     several,
@@ -24,7 +25,7 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
-from fuzzytree.files import check_place, write_atomically
+from fuzzytree.files import write_atomically
 
 if TYPE_CHECKING:
     from fuzzytree.benchmarking import Study
@@ -77,9 +78,13 @@ class BenchOptions(TableOptions, FullResultOptions):
         "Python module or package, which is run; its function "
         "peers(model, bounds) returns further candidates and omissions.",
     )
-    output: str | None = option("-o --output FILE", "JSON file to write the study to.")
-    plots: Sequence[str] = several(
-        "--picture FILE", "Picture of the study, as .svg or .png (repeat)."
+    output: str | None = output_option(
+        "-o --output FILE", "JSON file to write the study to."
+    )
+    plots: Sequence[str] = output_option(
+        "--picture FILE",
+        "Picture of the study, as .svg or .png (repeat).",
+        multiple=True,
     )
 
 
@@ -98,7 +103,7 @@ def command(options: BenchOptions) -> int:
     from fuzzytree.report import study_lines
 
     output, plots = options.output, options.plots
-    _check_places(output, plots)
+    _check_pictures(plots)
     with (
         wrong_options(),
         progress_bar(quiet=options.quiet) as show,
@@ -125,12 +130,13 @@ def command(options: BenchOptions) -> int:
     try:
         if output:
             write_atomically(output, found.to_json().encode() + b"\n")
-    finally:  # whatever happens to the file, the work is not lost
+        _draw(found, plots)
+    finally:  # whatever happens to the files, the work is not lost
         if options.as_json:
             answer_json(found.to_json())
         else:
             answer("\n".join(lines))
-    for place in (*([output] if output else []), *_draw(found, plots)):
+    for place in filter(None, (output, *plots)):
         say(f"wrote    {place}", quiet=options.quiet)
     return _ending(found, options)
 
@@ -158,13 +164,10 @@ def _ending(found: Study, options: BenchOptions) -> int:
     return 0
 
 
-def _check_places(output: str | None, plots: Sequence[str]) -> None:
-    """Refuse what cannot be written, before minutes of work."""
+def _check_pictures(plots: Sequence[str]) -> None:
+    """Refuse what is no picture, before minutes of work."""
     from fuzzytree.report import SUFFIXES, check_suffix
 
-    for place in (output, *plots):
-        if place:
-            check_place(place)
     for place in plots:
         suffix = Path(place).suffix.lower()
         if suffix not in SUFFIXES:
@@ -173,10 +176,10 @@ def _check_places(output: str | None, plots: Sequence[str]) -> None:
         check_suffix(suffix)
 
 
-def _draw(found: Study, places: Sequence[str]) -> Sequence[str]:
-    """Draw the study for most rows; return which files were written."""
+def _draw(found: Study, places: Sequence[str]) -> None:
+    """Draw the study for most rows."""
     if not places:
-        return ()
+        return
     from fuzzytree import report
 
     timings = [timing for point in found.points for timing in point.timings]
@@ -185,4 +188,3 @@ def _draw(found: Study, places: Sequence[str]) -> Sequence[str]:
     picture = report.work_precision(found, rows=rows, threads=threads)
     for place in places:
         picture.save(place)
-    return places

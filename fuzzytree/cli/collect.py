@@ -19,6 +19,7 @@ from fuzzytree.cli.console import (
     ignore_option,
     missing_option,
     option,
+    output_option,
     progress_bar,
     rows_per_class_option,
     say_rows,
@@ -26,7 +27,6 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
-from fuzzytree.files import check_places
 
 if TYPE_CHECKING:
     from fuzzytree.api import LeafCounts
@@ -43,7 +43,9 @@ class CollectOptions(TableOptions, ResultOptions):
     target: str = option(
         "--target COLUMN", "Column that holds the class of each row.", required=True
     )
-    output: str = option("-o --output FILE.state", "File to write.", required=True)
+    output: str = output_option(
+        "-o --output FILE.state", "File to write.", required=True
+    )
     model: str | None = option(
         "--for MODEL", "Count the rows in each leaf of a tree: the second pass."
     )
@@ -70,7 +72,6 @@ def command(options: CollectOptions) -> None:
     file for `fuzzytree learn --for MODEL`, which writes the exact supports of leaves
     and prints the accuracy on all rows.
     """
-    check_places([options.output], options.parts)
     if Path(options.output).suffix != STATE:
         raise click.UsageError(f"-o {options.output}: the name must end in {STATE}")
     if states := [one for one in options.parts if Path(one).suffix == STATE]:

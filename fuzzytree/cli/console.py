@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import glob
+import itertools
 import sys
 import time
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 import click
 import msgspec
 
-from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.model import printable, printable_json, printable_lines
+from fuzzytree.errors import FuzzyTreeError, TableError
+from fuzzytree.files import check_places
+from fuzzytree.model import as_names, printable, printable_json, printable_lines
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
     from fuzzytree.table_format import TableFormat
 
 Name = TypeVar("Name", str, str | None)
+Option = functools.partial[Any]
 Record = TypeVar("Record")
 Code = TypeVar("Code", int, None, int | None)
 
@@ -72,13 +77,26 @@ def argument(metavar: str, **about: Any) -> Any:
     return functools.partial(click.argument, metavar=metavar, **about)
 
 
+class _OutputFile(click.ParamType):
+    name = "file"
+
+
+OUTPUT = _OutputFile()
+"""The type of an option or an argument that names a file to write."""
+
+output_option = functools.partial(option, type=OUTPUT)
+
+_INPUTS = ("TABLE", "MODEL", "FILE", "FRAMES")  # of options that name files to read
+
+
 def takes(
     record: type[Record],
 ) -> Callable[[Callable[[Record], Code]], Callable[..., Code]]:
     """Give a command the options that a class has as attributes, as one object.
 
     Attributes of a base class come last. `Sections` prints the options of a class
-    below its attribute `heading`.
+    below its attribute `heading`. Files to write that the command reads as well, or
+    that cannot be written, are refused before it runs.
 
     Example:
         >>> class Words:
@@ -93,21 +111,35 @@ def takes(
     """
 
     def decorate(function: Callable[[Record], Code]) -> Callable[..., Code]:
+        parameters: list[tuple[str, Option]] = [
+            (name, value)
+            for base in record.__mro__
+            for name, value in vars(base).items()
+            if isinstance(value, functools.partial)
+        ]
+        outputs = [n for n, one in parameters if one.keywords.get("type") is OUTPUT]
+        inputs = [
+            name
+            for name, one in parameters
+            if one.func is click.argument or one.keywords.get("metavar") in _INPUTS
+        ]
+
         @functools.wraps(function)
-        def command(**values: object) -> Code:
+        def command(**values: Any) -> Code:
+            if written := _texts(values, outputs):
+                others = _texts(values, {*inputs} - {*outputs})
+                check_places(written, itertools.chain(*map(_files, others)))
             options = record()
             vars(options).update(values)
             return function(options)
 
-        parameters = [
-            (name, parameter, getattr(base, "heading", "Options"))
-            for base in record.__mro__
-            for name, parameter in vars(base).items()
-            if isinstance(parameter, functools.partial)
-        ]
-        for name, parameter, _ in reversed(parameters):
+        for name, parameter in reversed(parameters):
             parameter(name)(command)
-        vars(command)["headings"] = {name: title for name, _, title in parameters}
+        vars(command)["headings"] = {
+            name: getattr(base, "heading", "Options")
+            for base in record.__mro__
+            for name in vars(base)
+        }
         return command
 
     return decorate
@@ -130,6 +162,22 @@ class Sections(click.Command):
         for title, lines in sections.items():
             with formatter.section(title):
                 formatter.write_dl(lines)
+
+
+def _texts(values: Mapping[str, Any], names: Iterable[str]) -> list[str]:
+    """Return what the user wrote for some parameters, but `-`."""
+    rows = [as_names(values[name] or ()) for name in names]
+    return [text for row in rows for text in row if text not in ("", "-")]
+
+
+def _files(text: str) -> list[str]:
+    """Return the files that an argument stands for."""
+    if Path(text).is_dir() or glob.has_magic(text):
+        from fuzzytree.tables import files_of
+
+        with contextlib.suppress(TableError, OSError):
+            return files_of(text)
+    return [text, text.rpartition("=")[2]]  # as in CLASS=FILE
 
 
 verbose_option = flag("--verbose", "Print every part of the result, not only counts.")

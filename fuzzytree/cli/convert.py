@@ -12,6 +12,7 @@ import click
 import msgspec
 
 from fuzzytree.cli.console import (
+    OUTPUT,
     answer_bytes,
     answer_json,
     argument,
@@ -49,7 +50,7 @@ class ConvertOptions(WritingOptions):
     """The arguments and options of the verb."""
 
     source: str = argument("IN")
-    output: str = argument("OUT")
+    output: str = argument("OUT", type=OUTPUT)
     read_as: str | None = option(
         "--from FORMAT", "Format of IN; from its suffix by default."
     )

@@ -8,6 +8,7 @@ from fuzzytree.cli.console import (
     argument,
     flag,
     option,
+    output_option,
     takes,
     wrong_options,
 )
@@ -22,7 +23,7 @@ class ExportOptions(WritingOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
-    output: str = option(
+    output: str = output_option(
         "-o --output FILE", "File to write; `-` is stdout.", required=True
     )
     dtype: str | None = option(

@@ -24,6 +24,7 @@ from fuzzytree.cli.console import (
     ignore_option,
     missing_option,
     option,
+    output_option,
     progress_bar,
     rows_per_class_option,
     say_rows,
@@ -157,7 +158,7 @@ class PaperOptions:
 class OutputOptions(RepresentationOptions):
     """The options of what is written and printed."""
 
-    output: str = option(
+    output: str = output_option(
         "-o --output FILE", "File to write; `-` is stdout.", required=True
     )
     name: str | None = option(
@@ -166,7 +167,7 @@ class OutputOptions(RepresentationOptions):
     no_test: bool = flag(
         "--no-test", "Learn without measuring the cross-validated accuracy."
     )
-    front: str | None = option(
+    front: str | None = output_option(
         "--front FILE.svg",
         "Picture to draw: the accuracy of small trees, by columns per node and leaves.",
     )
@@ -204,7 +205,6 @@ def command(options: LearnOptions) -> None:
     """
     form = wanted_format(options.output, None)
     if options.output != "-":
-        check_place(options.output)
         check_place(_model_file(options.output, form))
     is_state = _is_states(options.tables)
     if options.weight is not None and (is_state or options.model is not None):
@@ -259,8 +259,6 @@ def _learnt(
         text = "from the rows that were kept; `collect --for` counts all rows"
         rows.append(("estimated", "supports of leaves", text))
     tested = small = None
-    if options.front is not None:
-        check_place(options.front)
     if not options.no_test:
         begin = time.perf_counter()
         with progress_bar(quiet=is_silent) as show:
@@ -387,12 +385,9 @@ def _counted(
 def _write(
     options: LearnOptions, tree: FuzzyTree, rows: Lines, form: Format, *, is_data: bool
 ) -> None:
-    """Say what was done, and write the model."""
+    """Write the model, and say what was done."""
     from fuzzytree.api import export
 
-    is_silent = options.quiet or options.output == "-"
-    width = max(map(len, (options.output, *(thing for _, thing, _ in rows))))
-    say_rows(*rows, width=width, quiet=is_silent)
     model = represented(tree, form, options)
     content = export(model, form.name).content
     if options.output == "-":
@@ -401,8 +396,10 @@ def _write(
     write_atomically(options.output, content)
     rest = ["--data", options.tables[0]] if is_data else []
     rest += table_format(options).words() if rest else []
-    written = _written_rows(model, options.output, form, rest)
-    say_rows(*written, width=width, quiet=is_silent)
+    written = [*_written_rows(model, options.output, form, rest)]
+    width = max(map(len, (options.output, *(thing for _, thing, _ in rows))))
+    say_rows(*rows, width=width, quiet=options.quiet)
+    say_rows(*written, width=width, quiet=options.quiet)
 
 
 def _is_states(tables: Sequence[str]) -> bool:

@@ -15,6 +15,7 @@ from fuzzytree.cli.console import (
     argument,
     data_option,
     option,
+    output_option,
     progress_bar,
     say,
     say_rows,
@@ -22,7 +23,6 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
-from fuzzytree.files import check_place
 
 if TYPE_CHECKING:
     from fuzzytree.model import Use
@@ -33,7 +33,7 @@ class NeedsOptions(TableOptions, FullResultOptions):
 
     model: str = argument("MODEL")
     data: str | None = data_option
-    output: str | None = option(
+    output: str | None = output_option(
         "-o --output FILE",
         "File to write the simplified model to, if its equality is proved.",
     )
@@ -83,8 +83,6 @@ def command(options: NeedsOptions) -> int:
             inputs="inputs" in options.drop,
             rules="rules" in options.drop,
         )
-    if options.output is not None:
-        check_place(options.output)
     rows = api.rows_of(table_source(options.data, options), first)
     with progress_bar(quiet=options.quiet) as show:
         report = benchmarking.report(
@@ -96,6 +94,8 @@ def command(options: NeedsOptions) -> int:
             budget_s=options.budget or 0.0,
             progress=show,
         )
+    if report.ok and options.output is not None:
+        api.save(found.model, options.output)
     if options.as_json:
         answer_json(report.to_json())
     else:
@@ -105,7 +105,6 @@ def command(options: NeedsOptions) -> int:
         say(f"the simplified model differs in {wrong} ways; nothing is written")
         return 1
     if options.output is not None:
-        api.save(found.model, options.output)
         after = f"predicts some rows differently from {options.model}"
         if found.is_same:
             files = [

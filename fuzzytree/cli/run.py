@@ -21,6 +21,7 @@ from fuzzytree.cli.console import (
     argument,
     flag,
     option,
+    output_option,
     progress_bar,
     quiet_option,
     say_rows,
@@ -61,7 +62,7 @@ class RunOptions(TableOptions):
 
     model: str = argument("MODEL")
     table: str = argument("TABLE")
-    output: str = option(
+    output: str = output_option(
         "-o --output FILE",
         "File to write: CSV, or Parquet or Arrow if its name ends in .parquet, "
         ".arrow or .feather; `-` is CSV on stdout.",

@@ -11,12 +11,11 @@ from fuzzytree.cli.console import (
     answer,
     answer_json,
     argument,
-    option,
+    output_option,
     say,
     takes,
     wrong_options,
 )
-from fuzzytree.files import check_place
 
 if TYPE_CHECKING:
     from fuzzytree.model import Coverage, Document, Reading
@@ -26,7 +25,7 @@ class ShowOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
-    picture: str | None = option(
+    picture: str | None = output_option(
         "--picture FILE", "Picture of the tree to write, as .svg or .png."
     )
 
@@ -44,8 +43,6 @@ def command(options: ShowOptions) -> None:
     from fuzzytree import api, report
     from fuzzytree.runtimes import OnnxModel
 
-    if options.picture is not None:
-        check_place(options.picture)
     if Path(options.model).suffix.lower() == ".onnx":
         if options.picture is not None:
             raise click.UsageError(
@@ -61,9 +58,10 @@ def command(options: ShowOptions) -> None:
         return
     found = api.read(options.model)
     coverage = _coverage(found.model)
-    _tell(found, coverage, quiet=options.quiet)
     if options.picture is not None:
-        _draw(found.model, options.picture, quiet=options.quiet)
+        _draw(found.model, options.picture)
+        say(f"wrote    {options.picture}", quiet=options.quiet)
+    _tell(found, coverage, quiet=options.quiet)
     if options.as_json:
         answer_json({**_facts(found), "coverage": coverage})
     else:
@@ -91,7 +89,7 @@ def _tell(found: Reading, coverage: Coverage | None, *, quiet: bool) -> None:
         say(f"remark   {remark}", quiet=quiet)
 
 
-def _draw(model: Document, picture: str, *, quiet: bool) -> None:
+def _draw(model: Document, picture: str) -> None:
     from fuzzytree import report
     from fuzzytree.model import FuzzyTree
 
@@ -101,7 +99,6 @@ def _draw(model: Document, picture: str, *, quiet: bool) -> None:
         )
     with wrong_options():
         report.draw_tree(model).save(picture)
-    say(f"wrote    {picture}", quiet=quiet)
 
 
 def _facts(found: Reading) -> dict[str, object]:

@@ -267,8 +267,7 @@ def test_a_table_is_read_in_blocks(tmp_path: Path) -> None:
         ),
         (
             "number,r0c0\n9007199254740993,1\n",
-            ":2: number: 9007199254740992 is no whole number from 0 to "
-            "9007199254740991",
+            ":2: column 'number' holds 9007199254740993, which a double rounds",
         ),
         ("r0c0,r0c1\n1,2\n3\n", ":3: 1 cell, and line 1 names 2 columns"),
         ('r0c0\n"1\n', ":2: broken CSV: a quote is not closed"),
@@ -297,11 +296,10 @@ def test_a_table_that_does_not_fit_is_refused_in_a_sentence(
 
 def test_a_table_that_is_no_text_or_too_large_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
-    for content in (b"\xff\xfe", b"r0c0\n\xff\n"):
-        path.write_bytes(content)
-        with pytest.raises(ReadError) as caught:
-            read_frames(path)
-        assert str(caught.value) == f"{path}: is no UTF-8 text; save it as UTF-8"
+    path.write_bytes(b"r0c0\n\xff\n")
+    with pytest.raises(ReadError) as caught:
+        read_frames(path)
+    assert str(caught.value).startswith(f"{path}: is no UTF-8 text; save it as UTF-8")
     with path.open("wb") as file:
         file.truncate(2**30 + 1)
     with pytest.raises(ReadError) as caught:

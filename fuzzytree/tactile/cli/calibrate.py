@@ -14,11 +14,12 @@ from fuzzytree.cli import (
     argument,
     flag,
     option,
+    output_option,
     say_rows,
     takes,
 )
 from fuzzytree.errors import ReadError
-from fuzzytree.files import check_place, write_atomically
+from fuzzytree.files import write_atomically
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray
@@ -34,7 +35,7 @@ class TactileCalibrateOptions(ResultOptions):
     total: bool = flag(
         "--total", "The loads are forces of a whole object, not pressures on each cell."
     )
-    output: str = option("-o --output FILE", "Board to write.", required=True)
+    output: str = output_option("-o --output FILE", "Board to write.", required=True)
 
 
 @click.command("calibrate", short_help="Fit what readings mean to known loads.")
@@ -49,7 +50,6 @@ def command(options: TactileCalibrateOptions) -> None:
     from fuzzytree.tactile.board_file import board_text, load_board
     from fuzzytree.tactile.calibration import fit_forces, fit_pressures
 
-    check_place(options.output)
     board = load_board(options.board)
     loads: list[float] = []
     readings: list[FloatArray] = []

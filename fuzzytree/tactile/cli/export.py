@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from fuzzytree.cli import (
+    OUTPUT,
     answer,
     answer_bytes,
     answer_json,
@@ -23,7 +24,7 @@ from fuzzytree.cli import (
     takes,
     wrong_options,
 )
-from fuzzytree.files import check_place, write_atomically
+from fuzzytree.files import write_atomically
 from fuzzytree.tactile.cli.sensors import (
     SensorOptions,
     data_option,
@@ -38,7 +39,7 @@ class TactileExportOptions(SensorOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
-    output: str = argument("OUT")
+    output: str = argument("OUT", type=OUTPUT)
     to: str | None = option(
         "--to", "Format; default by the suffix of OUT.", choices=_FORMS
     )
@@ -83,8 +84,6 @@ def command(options: TactileExportOptions) -> int:
         values: dict[str, Any] = option_values(known, map(setting, options.settings))
     if form == "onnx":
         require("onnxruntime", "verifying a written onnx file needs")
-    if options.output != "-":
-        check_place(options.output)
     sensor = sensor_of_options(options)
     source = frames_model(options.model)
     check_inputs(source)
@@ -105,6 +104,8 @@ def command(options: TactileExportOptions) -> int:
         }
         text = ", ".join(f"{count} {name}" for name, count in shown.items())
         lines.append(f"{options.data}: {text}")
+    if found.ok and options.output != "-":
+        write_atomically(options.output, written.content)
     if options.output == "-":
         for line in lines:
             say(line, quiet=options.quiet)
@@ -119,8 +120,6 @@ def command(options: TactileExportOptions) -> int:
         return 1
     if options.output == "-":
         answer_bytes(written.content)
-    else:
-        write_atomically(options.output, written.content)
     digest = hashlib.sha256(written.content).hexdigest()
     said = f"{form}, {len(written.content)} bytes, sha256 {digest}"
     say_rows(("wrote", options.output, said), quiet=options.quiet)

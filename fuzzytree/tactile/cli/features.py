@@ -19,12 +19,13 @@ from fuzzytree.cli import (
     answer_json,
     argument,
     option,
+    output_option,
     say_rows,
     takes,
     wrong_options,
 )
 from fuzzytree.errors import ReadError
-from fuzzytree.files import check_place, write_atomically
+from fuzzytree.files import write_atomically
 from fuzzytree.tactile.cli.sensors import FramesOptions, board_of_options
 
 if TYPE_CHECKING:
@@ -55,7 +56,9 @@ class TactileFeaturesOptions(FramesOptions):
     label: str = option(
         "--label ARRAY", "Array of FRAMES with the classes.", default="label"
     )
-    output: str | None = option("-o --output FILE", "CSV file to write; `-` is stdout.")
+    output: str | None = output_option(
+        "-o --output FILE", "CSV file to write; `-` is stdout."
+    )
 
 
 @click.command("features", short_help="Turn frames into a table of features.")
@@ -71,8 +74,6 @@ def command(options: TactileFeaturesOptions) -> None:
     from fuzzytree.tactile.features import costs
     from fuzzytree.tactile.features.names import names_of
 
-    if options.output and options.output != "-":
-        check_place(options.output)
     with wrong_options():
         names = names_of(options.text)
     parts = [*_parts(options)]

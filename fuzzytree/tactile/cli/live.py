@@ -15,6 +15,7 @@ from fuzzytree.cli import (
     argument,
     flag,
     option,
+    output_option,
     quiet_option,
     say,
     say_rows,
@@ -81,7 +82,9 @@ class TactileLiveOptions:
         type=click.IntRange(1, 9),
         default=3,
     )
-    record: str | None = option("--record FILE", "Recording to write the frames to.")
+    record: str | None = output_option(
+        "--record FILE", "Recording to write the frames to."
+    )
     speed: float = option(
         "--speed X",
         "Speed of frames that are recorded; 0 for no pauses.",

@@ -19,13 +19,13 @@ from fuzzytree.cli import (
     argument,
     flag,
     option,
+    output_option,
     progress_bar,
     say,
     say_rows,
     takes,
 )
 from fuzzytree.errors import PortError, WriteError
-from fuzzytree.files import check_place
 from fuzzytree.tactile.cli.signals import stop_signal
 
 if TYPE_CHECKING:
@@ -40,7 +40,9 @@ class TactileRecordOptions(ResultOptions):
 
     board: str = argument("BOARD.yaml")
     port: str = argument("PORT")
-    output: str = option("-o --output FILE", "Recording to write.", required=True)
+    output: str = output_option(
+        "-o --output FILE", "Recording to write.", required=True
+    )
     frames: int | None = option(
         "--frames N", "Number of frames to record.", type=click.IntRange(1)
     )
@@ -67,7 +69,6 @@ def command(options: TactileRecordOptions) -> int:
     if options.output == "-":
         raise click.UsageError("a recording is a file, and not standard output")
     known, quiet = load_board(options.board), options.quiet
-    check_place(options.output)
     if Path(options.output).exists() and not options.force:
         raise WriteError(f"{options.output}: is there already; --force replaces it")
     count, first, last = 0, 0.0, 0.0

@@ -16,10 +16,10 @@ from fuzzytree.cli import (
     answer_json,
     argument,
     option,
+    output_option,
     say_rows,
     takes,
 )
-from fuzzytree.files import check_places
 from fuzzytree.model import printable
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class TactileReplayOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     frames: str = argument("FRAMES")
-    output: str | None = option(
+    output: str | None = output_option(
         "-o --output FILE",
         "File for the frames (.ftr, .csv, .npz, .h5), for pictures of them (.gif, "
         ".mp4), for one of a frame (.svg, .png) or for the board (.yaml).",
@@ -61,11 +61,9 @@ def command(options: TactileReplayOptions) -> None:
     from fuzzytree.tactile.writers import WRITERS
 
     suffix = Path(options.output or "").suffix.lower()
-    if options.output is not None:
-        check_places([options.output], [options.frames])
-        if suffix not in WRITERS:
-            known = ", ".join(WRITERS)
-            raise click.UsageError(f"-o writes {known}, not {options.output}")
+    if options.output is not None and suffix not in WRITERS:
+        known = ", ".join(WRITERS)
+        raise click.UsageError(f"-o writes {known}, not {options.output}")
     chosen = () if options.frame is None else (options.frame,)
     if chosen and suffix not in SUFFIXES:
         known = " or ".join(SUFFIXES)
@@ -76,13 +74,14 @@ def command(options: TactileReplayOptions) -> None:
         if chosen and found.frames <= chosen[0]:
             known = f"{options.frames} has {counted(found.frames, 'frame')}"
             raise click.UsageError(f"--frame {chosen[0]}: {known}, numbered from 0")
+        if options.output is not None:
+            WRITERS[suffix](options.output, file, *chosen)
         if options.as_json:
             facts = {"board": file.board, "started": _started(file)}
             answer_json({**facts, **asdict(found)})
         else:
             answer("\n".join(_lines(options.frames, file, found)))
         if options.output is not None:
-            WRITERS[suffix](options.output, file, *chosen)
             sensor = file.board.sensor
             rests = any(sensor.baseline) or bool(sensor.masked)
             is_bare = suffix in (".csv", ".npz") and rests
