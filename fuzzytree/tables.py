@@ -210,6 +210,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
         categories: Of columns of text or truth values, by name; their values are
             positions among these.
         dates: The columns of dates; their values are days since 1970-01-01 (UTC).
+        is_categorical: Whether the target was said to have categories.
     """
 
     name: str
@@ -227,6 +228,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
     weightless: int = 0
     categories: Mapping[str, tuple[str, ...]] = {}
     dates: tuple[str, ...] = ()
+    is_categorical: bool = False
 
     @property
     def rows(self) -> int:
@@ -581,6 +583,7 @@ class LearningRows:
             weightless=self.weightless,
             categories=columns.categories,
             dates=columns.dates,
+            is_categorical=self.target in self.categorical,
         )
 
     def _chosen(self, first: TablePiece) -> list[int]:

@@ -220,7 +220,7 @@ def _learnt(
     options: LearnOptions, *, is_state: bool
 ) -> tuple[FuzzyTree, Lines, object]:
     """Return a tree of all rows, what to say about it, and the facts."""
-    from fuzzytree.api import accuracy, front, grouped, learn_table
+    from fuzzytree.api import accuracy, front, grouped, learn_table, majority
     from fuzzytree.learning import remarks
     from fuzzytree.report import counted
     from fuzzytree.tables import Table
@@ -254,6 +254,9 @@ def _learnt(
     leaves = counted(len(tree.leaves), "leaf", "leaves")
     rows = [("learnt", leaves, _timed(size, begin)), read]
     rows += [("remark", column, f"has {text}") for column, text in noticed.items()]
+    if len(tree.leaves) == 1:
+        text = f"has one leaf: it predicts {tree.leaves[0].label!r} for every row"
+        rows.append(("remark", "the tree", printable(text)))
     rows += _report_rows(learnt.report, is_verbose=options.verbose)
     if found.weights is not None and learnt.report.rows_sampled < learnt.report.rows:
         text = "from the rows that were kept; `collect --for` counts all rows"
@@ -272,6 +275,9 @@ def _learnt(
             if tested is not None and tested.weak is not None:
                 learnt = _with_floor(learnt, tested.floor)
                 rows.append(_floor_row(tested))
+        if tested is not None and tested.mean <= majority(found, settings):
+            text = "is not above the share of the majority class"
+            rows.append(("remark", "accuracy", text))
         rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
         if groups is None:  # its folds know none
             small = front(found, settings)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -132,6 +133,10 @@ _REPAIRS = {
 _MANY = 20
 """So many classes are usual, even where their names are numbers with fractions."""
 
+_CODES = 50
+"""So many whole numbers may be codes; with more, few rows for each and some left out,
+they are measurements."""
+
 _ROWS_PER_CLASS = 5
 """With fewer rows for each of many classes there is little to learn from."""
 
@@ -151,9 +156,11 @@ def remarks(table: Table, ignoring: Callable[[str], str]) -> Iterator[tuple[str,
     Raises:
         LearningError: If the target holds measurements and no classes: its values are
             numbers, and two of these are true: there are more than 20 different ones,
-            some have fractions, more than half of the rows have one to themselves.
+            some have fractions, more than half of the rows have one to themselves; or
+            there are more than 50 with gaps between them and less than 50 rows each.
     """
-    refuse_measurements(table.name, table.target, table.classes, table.codes)
+    if not table.is_categorical:
+        refuse_measurements(table.name, table.target, table.classes, table.codes)
     yield from table.remarks
     rows, classes = table.rows, len(table.classes)
     if classes > _MANY and rows < _ROWS_PER_CLASS * classes:
@@ -185,11 +192,15 @@ def refuse_measurements(
     single = int(np.count_nonzero(np.bincount(codes) == 1))
     is_spread = 2 * single > len(codes)
     is_many = len(numbers) > _MANY
-    if has_fractions + is_spread + is_many >= 2:
+    is_thin = len(numbers) > _CODES and len(codes) < _CODES * len(numbers)
+    has_gaps = max(numbers) - min(numbers) >= len(numbers)
+    if has_fractions + is_spread + is_many >= 2 or (target and is_thin and has_gaps):
+        column = shlex.quote(target)
+        insist = f", or pass --categorical {column} if each is a class" if of else ""
         raise LearningError(
             f"{name}: the target{of} is continuous, with {len(numbers)} "
             f"different numbers in {len(codes)} rows, and a tree predicts "
-            "classes; divide the numbers into ranges and learn these"
+            f"classes; divide the numbers into ranges and learn these{insist}"
         )
 
 

@@ -337,6 +337,7 @@ class Learner:
             weights=weights[sample.codes],
             categories=columns.categories,
             dates=columns.dates,
+            is_categorical=self.target in self.categorical,
         )
 
     def _learnt_columns(self, statistics: Statistics) -> LearntColumns:
@@ -595,7 +596,8 @@ def read_or_collect(
         )
     positions, classes = rows.labels.ordered()
     codes = np.concatenate([piece.codes for piece in whole])
-    refuse_measurements(rows.name, rows.target, classes, positions[codes])
+    if rows.target not in rows.categorical:
+        refuse_measurements(rows.name, rows.target, classes, positions[codes])
     learner = Learner(rows.target, name=rows.name, settings=settings)
     taken = (whole.pop(0) for _ in range(len(whole)))  # not kept in memory
     learner.collect(rows, itertools.chain(taken, pieces), THREADS)

@@ -126,7 +126,44 @@ def test_a_continuous_target_is_refused(call: Call) -> None:
     assert err == (
         "t.csv: the target 'alcohol' is continuous, with 126 different numbers in 178 "
         "rows, and a tree predicts classes; divide the numbers into ranges and learn "
-        "these\n"
+        "these, or pass --categorical alcohol if each is a class\n"
+    )
+
+
+def test_whole_numbers_with_gaps_are_classes_only_if_somebody_says_so(
+    call: Call,
+) -> None:
+    rows = "".join(f"{k % 7},{3 * (k % 61)}\n" for k in range(600))
+    err = _refused(call, f"a,t\n{rows}", "--target", "t")
+    assert err == (
+        "t.csv: the target 't' is continuous, with 61 different numbers in 600 rows, "
+        "and a tree predicts classes; divide the numbers into ranges and learn these, "
+        "or pass --categorical t if each is a class\n"
+    )
+    words = ("learn", "t.csv", "--target", "t", "--no-test", "-o", "m.yaml")
+    assert call(*words, "--categorical", "t")[0] == 0
+    codes = "".join(f"{k % 7},{k % 61}\n" for k in range(600))
+    Path("t.csv").write_text(f"a,t\n{codes}", "utf-8")
+    assert call(*words)[0] == 0
+
+
+def test_a_tree_that_learnt_nothing_says_so(call: Call) -> None:
+    rows = "".join(f"{k % 2},{'ab'[k % 3 == 0]}\n" for k in range(60))
+    Path("t.csv").write_text(f"a,t\n{rows}", "utf-8")
+    code, _, err = call("learn", "t.csv", "--target", "t", "-o", "m.yaml")
+    assert code == 0
+    said = " ".join(err.split())
+    assert "remark the tree has one leaf: it predicts 'a' for every row" in said
+    assert "remark accuracy is not above the share of the majority class" in said
+
+
+def test_a_column_in_the_place_of_a_table_is_named(call: Call) -> None:
+    Path("t.csv").write_text("a,class\n1,x\n", "utf-8")
+    assert call("learn", "t.csv", "class", "-o", "m.yaml") == (
+        2,
+        "",
+        "there is no file 'class'; if it is the column of the classes, pass --target "
+        "class\n  fuzzytree learn --help lists the options\n",
     )
 
 
