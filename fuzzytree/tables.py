@@ -1000,7 +1000,8 @@ def columns_of(
             continue
         examples = (first or {}).get(name, {})
         texts = held.texts or (examples.get("text", ("", ""))[1],)
-        hint = "" if is_declared else number_hint(texts)
+        is_hinted = kind == "text" and not is_declared
+        hint = number_hint(texts) if is_hinted else ""
         if kind is None or hint:
             mixed[name] = _mixed_text(table, name, held, examples, hint)
         elif kind == "text" and held.is_identifier(is_categorical=is_declared):

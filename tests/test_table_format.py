@@ -304,6 +304,13 @@ def test_a_sheet_of_excel_is_read() -> None:
     )
 
 
+def test_few_texts_beside_numbers_are_not_taken_for_numbers() -> None:
+    rows = "1.5;a\n" * 30
+    assert _error(f"hue;grip\n{rows}1,5;b\n").startswith(
+        "t.csv:32: column 'hue' holds text where a number is needed: '1,5' (1 among 30"
+    )
+
+
 def test_a_zip_file_is_no_table() -> None:
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as file:

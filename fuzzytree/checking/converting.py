@@ -43,6 +43,7 @@ from fuzzytree.semantics import (
     rules_from_tree,
     unsampled_terms,
 )
+from fuzzytree.tables import SUFFIXES
 
 if TYPE_CHECKING:
     from fuzzytree.model import Coverage
@@ -110,15 +111,23 @@ def format_of(path: str | os.PathLike[str]) -> Format:
     Raises:
         ReadError: If there is none.
     """
-    suffix = Path(path).suffix
+    name, suffix = os.fspath(path) or "''", Path(path).suffix
     try:
         return find_format(suffix or "no suffix")
     except ValueError as error:
-        known = str(error).rpartition("; ")[2]
+        if name.lower().endswith(SUFFIXES):
+            raise ReadError(
+                f"{name}: is a table, and a model stands here: `fuzzytree run MODEL "
+                "TABLE`, and `--data TABLE` for other verbs"
+            ) from error
+        _, mark, hint = str(error).rpartition(" (")
+        known = ", ".join(form.name for form in all_formats() if form.read)
         shown = f"no format of a model has the suffix {suffix!r}"
         shown = shown if suffix else "has no suffix that names its format"
-        name = os.fspath(path) or "''"
-        raise ReadError(f"{name}: {shown}; {known}") from error
+        text = (
+            f"{name}: {shown}; models are read from {known}{mark}{hint if mark else ''}"
+        )
+        raise ReadError(text) from error
 
 
 def read(path: str | os.PathLike[str], *, format: str | None = None) -> Reading:

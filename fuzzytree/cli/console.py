@@ -77,11 +77,7 @@ def argument(metavar: str, **about: Any) -> Any:
     return functools.partial(click.argument, metavar=metavar, **about)
 
 
-class _OutputFile(click.ParamType):
-    name = "file"
-
-
-OUTPUT = _OutputFile()
+OUTPUT = click.Path(readable=False)
 """The type of an option or an argument that names a file to write."""
 
 output_option = functools.partial(option, type=OUTPUT)
@@ -117,8 +113,10 @@ def takes(
             for name, value in vars(base).items()
             if isinstance(value, functools.partial)
         ]
-        outputs = [n for n, one in parameters if one.keywords.get("type") is OUTPUT]
-        inputs = [
+        outputs: list[str] = [
+            n for n, one in parameters if one.keywords.get("type") is OUTPUT
+        ]
+        inputs: list[str] = [
             name
             for name, one in parameters
             if one.func is click.argument or one.keywords.get("metavar") in _INPUTS

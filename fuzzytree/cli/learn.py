@@ -206,7 +206,7 @@ def command(options: LearnOptions) -> None:
     form = wanted_format(options.output, None)
     if options.output != "-":
         check_place(_model_file(options.output, form))
-    is_state = _is_states(options.tables)
+    is_state = _is_states(options)
     if options.weight is not None and (is_state or options.model is not None):
         raise click.UsageError("--weight: states count rows, which have no weights")
     work = _learnt if options.model is None else _counted
@@ -408,14 +408,21 @@ def _write(
     say_rows(*written, width=width, quiet=options.quiet)
 
 
-def _is_states(tables: Sequence[str]) -> bool:
+def _is_states(options: LearnOptions) -> bool:
     """Return whether all tables are states; tables are refused beside another one."""
+    tables = options.tables
     states = [one for one in tables if Path(one).suffix == STATE]
     if states and len(states) < len(tables):
         other = next(one for one in tables if one not in states)
         raise click.UsageError(
             f"{states[0]} is a state, and {other} is none: collect the tables first, "
             "and learn from states alone"
+        )
+    absent = [one for one in tables[1:] if not Path(one).exists()]
+    if absent and options.target is None and Path(tables[0]).exists():
+        raise click.UsageError(
+            f"there is no file {absent[0]!r}; if it is the column of the classes, pass "
+            f"--target {shlex.quote(absent[0])}"
         )
     if len(tables) > 1 and not states:
         raise click.UsageError(

@@ -38,6 +38,11 @@ VERBS: Mapping[str, str] = MappingProxyType(
 """The module whose `command` each verb is, in the order of the help."""
 
 
+_OTHER_WORDS: Mapping[str, str] = MappingProxyType(
+    {"train": "learn", "fit": "learn", "predict": "run", "verify": "check"}
+)
+
+
 class Verbs(click.Group):
     """A group that imports a verb's module when the verb is used.
 
@@ -66,7 +71,8 @@ class Verbs(click.Group):
         name = args[0]
         if name not in self.modules and not name.startswith("-"):
             close = difflib.get_close_matches(name, self.modules, n=1)
-            hint = f" (did you mean {close[0]!r}?)" if close else ""
+            meant = {_OTHER_WORDS.get(name, ""), *close} & {*self.modules}
+            hint = f" (did you mean {meant.pop()!r}?)" if meant else ""
             raise click.UsageError(
                 f"no verb {name!r}; there is {', '.join(self.modules)}{hint}", ctx
             )

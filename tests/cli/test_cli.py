@@ -74,6 +74,19 @@ def test_an_unknown_verb_is_a_sentence_with_a_guess(call: Call) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("word", "verb"), [("predict", "run"), ("train", "learn"), ("fit", "learn")]
+)
+def test_the_words_of_other_libraries_lead_to_a_verb(
+    call: Call, word: str, verb: str
+) -> None:
+    code, _, err = call(word, "t.csv")
+    assert (code, err.splitlines()[0]) == (
+        2,
+        f"no verb {word!r}; there is {', '.join(VERBS)} (did you mean {verb!r}?)",
+    )
+
+
 def test_an_unknown_option_is_a_sentence_with_a_guess(call: Call) -> None:
     code, out, err = call("run", "a", "b", "--strenths")
     assert (code, out) == (2, "")

@@ -105,7 +105,7 @@ def test_facts_are_printed_as_json(
         ),
         (
             ["collect", "part0.csv", "--for", "part0.csv"],
-            "part0.csv: no format of a model",
+            "part0.csv: is a table, and a model stands here",
         ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

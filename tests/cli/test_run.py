@@ -10,7 +10,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from fuzzytree import api, tables
-from fuzzytree.exporters.table import TABLE
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.testing import rated
 from tests.cli.conftest import GRASPS, Call
@@ -206,12 +205,13 @@ def test_a_missing_column_is_named(call: Call) -> None:
         ("absent.onnx", "absent.onnx: cannot be read: no such file or directory\n"),
         (
             "grip",
-            f"grip: has no suffix that names its format; there is {', '.join(TABLE)}\n",
+            "grip: has no suffix that names its format; models are read from yaml, "
+            "fcl, fll, fis, fml\n",
         ),
         (
             "grasps.csv",
-            "grasps.csv: no format of a model has the suffix '.csv'; "
-            f"there is {', '.join(TABLE)}\n",
+            "grasps.csv: is a table, and a model stands here: `fuzzytree run MODEL "
+            "TABLE`, and `--data TABLE` for other verbs\n",
         ),
         (
             "grip.py",

@@ -111,7 +111,9 @@ def mapping_of_format(
             f"{value!r}; this one reads {known!r}"
         )
     elif value.startswith("fuzzytree/"):
-        text = f"this is a model, and no {noun}; {text}"
+        what = f"{value!r} is none that this fuzzytree reads"
+        is_model = known == layout.YAML_FORMAT
+        text = f"{what if is_model else f'this is a model, and no {noun}'}; {text}"
     raise report(name, [*mistakes, (node.line, node.column, text)])
 
 
