@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Never, Self
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Self
 
 import narwhals as nw
 import numpy as np
@@ -56,6 +57,7 @@ except ImportError as error:
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray, IntArray, ModelKind, Outcome, Run
 
+P = ParamSpec("P")
 LabelArray = npt.NDArray[np.generic]
 Mode = Literal["default", "paper"]
 PatternsPerClass = int | Mapping[str, int] | None
@@ -99,6 +101,18 @@ def _as_numbers(
     values[[[*titles].index(name) for name in table.columns]] = table.values
     categories = {titles[name]: texts for name, texts in table.categories.items()}
     return values.T, categories, [titles[name] for name in table.dates]
+
+
+def _with_hints(construct: Callable[P, None]) -> Callable[P, None]:
+    """Return a constructor that refuses a keyword of another name with ours."""
+    names = [*inspect.signature(construct).parameters][1:]
+
+    @functools.wraps(construct)
+    def checked(*args: P.args, **settings: P.kwargs) -> None:
+        refuse_unknown("FuzzyTreeClassifier", settings, names)
+        construct(*args, **settings)
+
+    return checked
 
 
 def _sound_labels(y: Any) -> Any:
@@ -176,6 +190,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     _learner: ArrayLearner
     _run: Callable[[ModelKind], Run]
 
+    @_with_hints
     def __init__(
         self,
         *,
@@ -194,9 +209,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         costs: Mapping[str, float] | None = None,
         class_weight: LabelWeight = None,
         seed: int = 0,
-        **others: Never,
     ) -> None:
-        refuse_unknown("FuzzyTreeClassifier", others, self._get_param_names())
         self.mode = mode
         self.columns_per_node = columns_per_node
         self.leaves = leaves
