@@ -14,7 +14,8 @@ from fuzzytree.cli.console import answer
 def command(audit: str, model: str, new: str | None) -> int:
     """Check AUDIT, the JSON of an audit, against MODEL, the YAML file that it is of.
 
-    With NEW, AUDIT is the JSON of `fuzzytree diff MODEL NEW`.
+    Convert a file of another format to YAML first, and audit that. With NEW, AUDIT is
+    the JSON of `fuzzytree diff MODEL NEW`.
 
     Everything is read, evaluated and decided again by code that imports nothing else
     of fuzzytree and runs alone; `python -m fuzzytree.auditing.recheck` is the same.

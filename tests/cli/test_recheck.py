@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -8,7 +9,11 @@ from pathlib import Path
 
 import pytest
 
+import fuzzytree as ft
 from fuzzytree.auditing.recheck.checks import LIMITS
+from tests.auditing.diff.test_system_numbers import tipper
+
+CODES = ("--select", "FT1,FT301,FT404")
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -76,3 +81,27 @@ def test_the_module_is_the_same_program(call: Call, audit: dict[str, object]) ->
     )
     code, out, err = call("recheck", "audit.json", "grip.yaml")
     assert (ran.returncode, ran.stdout, ran.stderr) == (code, out, err)
+
+
+@pytest.mark.parametrize("form", ["fis", "fcl", "fll", "fml"])
+def test_an_audit_of_another_format_is_refused_with_steps_that_work(
+    call: Call, form: str
+) -> None:
+    name = f"tip it.{form}"
+    ft.save(tipper(), name, allow_loss=True)
+    Path("audit.json").write_text(call("audit", name, *CODES, "--json")[1])
+    code, out, err = call("recheck", "audit.json", name)
+    step = f"fuzzytree convert '{name}' 'tip it.yaml'"
+    assert (code, out) == (2, "")
+    assert err.splitlines()[0] == (
+        f"{name}: only YAML is checked again; convert it, and audit and check "
+        f"'tip it.yaml': {step}"
+    )
+    assert call(*shlex.split(step)[1:])[0] == 0
+    audited = call("audit", "tip it.yaml", *CODES, "--json")[1]
+    Path("audit.json").write_text(audited)
+    code, out, _ = call("recheck", "audit.json", "tip it.yaml")
+    assert (code, out.splitlines()[0]) == (
+        0,
+        "the audit is right as far as it was checked again",
+    )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from pathlib import PurePath
 from typing import Any, NamedTuple
 
 from fuzzytree.auditing.recheck.outcomes import CannotRunError, UndecidedError
@@ -110,8 +112,11 @@ class Model:
         except CannotRunError as error:
             if name.lower().endswith((".yaml", ".yml")):
                 raise
-            text = "convert it (fuzzytree convert), and audit that"
-            raise CannotRunError(f"{error}; only YAML is read here: {text}") from error
+            there = shlex.quote(str(PurePath(name).with_suffix(".yaml")))
+            raise CannotRunError(
+                f"{name}: only YAML is checked again; convert it, and audit and check "
+                f"{there}: fuzzytree convert {shlex.quote(name)} {there}"
+            ) from error
         kind = top.get("kind") if isinstance(top, dict) else None
         if str(kind) not in MEANINGS:
             text = f"rule bases, trees and systems are checked, not {kind!r:.60}"

@@ -156,8 +156,8 @@ def test_a_file_of_another_format_is_refused_with_the_conversion() -> None:
     with pytest.raises(CannotRunError) as refused:
         Model(b"FUNCTION_BLOCK brake\n", "brake.fcl")
     assert str(refused.value) == (
-        "brake.fcl:1: no key and no list: 'FUNCTION_BLOCK brake'; only YAML is read "
-        "here: convert it (fuzzytree convert), and audit that"
+        "brake.fcl: only YAML is checked again; convert it, and audit and check "
+        "brake.yaml: fuzzytree convert brake.fcl brake.yaml"
     )
 
 
