@@ -75,9 +75,9 @@ def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
 def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> Picture:
     """Draw a tree: the variable of each node, the terms of its branches, the classes.
 
-    A node shows its variable and its cuts. A leaf shows its class, the pattern if the
-    class has several, and how many training rows reached it; where that is known of
-    all leaves, a branch is the thicker the more rows took it. Below the tree stand the
+    A node shows its variable and its cuts. A leaf shows its class, and how many
+    training rows reached it; where that is known of all leaves, a branch is the thicker
+    the more rows took it. Below the tree stand the
     combinations of variables that nodes test.
 
     Args:
@@ -158,7 +158,7 @@ def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
         else:
             position = leaf or 1
             end = tree.leaves[position - 1]
-            box = Box(level, end.pattern or end.label, "", branch, codes[end.label])
+            box = Box(level, end.label, "", branch, codes[end.label])
             box.rows = end.support
             if rows:
                 _count(box, rows.leaves[position - 1])
