@@ -105,7 +105,7 @@ def test_a_model_of_one_leaf_is_audited_shown_and_decided_again(is_tree: bool) -
     model = tree if is_tree else rules_from_tree(tree)
     content = yaml.write(model).content
     material = Material(model, model_file("leaf.yaml", content))
-    found = audit(material, selection=AuditSelection(ignore=["FT6"]))
+    found = audit(material, selection=AuditSelection(skip=["FT6"]))
     assert (found.findings, found.is_complete) == ((), True)
     report = recheck(msgspec.json.encode(found), content, ("audit", "leaf.yaml"))
     assert report.wrong == []
