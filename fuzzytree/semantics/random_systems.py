@@ -233,7 +233,7 @@ class _Maker:
         if is_weighted:
             return how
         samples = chance.choice((2, 3, 7, 16, 33, 100))
-        grids: tuple[Grid, ...] = ("middle", "ends", "half ends")
+        grids: tuple[Grid, ...] = ("middle", "low ends", "ends", "half ends")
         return Defuzzifier(how.method, samples, chance.choice(grids))
 
     def _block(

@@ -135,7 +135,7 @@ def _graph(content: bytes, name: str) -> Runner:
 
     def run(frames: Cells) -> Answers:
         try:
-            starts = range(0, len(frames), _FRAMES_AT_ONCE)
+            starts = range(0, max(len(frames), 1), _FRAMES_AT_ONCE)
             parts = [
                 bare(outputs, {"frames": frames[start : start + _FRAMES_AT_ONCE]})
                 for start in starts
