@@ -34,7 +34,7 @@ from fuzzytree.exporters.c_text import (
     whole_lines,
     whole_table,
 )
-from fuzzytree.exporters.program_text import check_rated, title_of
+from fuzzytree.exporters.program_text import check_rated, source_of, title_of
 from fuzzytree.model import (
     Document,
     Format,
@@ -176,6 +176,7 @@ def write_c(
         >>> "grip_answer grip_decide(const grip_real *x)" in text
         True
     """
+    source = source_of(write_c, model, locals())
     if dtype not in _NUMBERS:
         raise ValueError(f"C has float64 and float32, not {dtype!r}")
     if probabilities:
@@ -186,14 +187,16 @@ def write_c(
             raise ValueError("fuzzy systems are written in float64 only")
         parts = _system_text(model, activations=activations, selftest=selftest)
         body = "".join(parts)
-        text = "".join(_heading(model)) + fill(body, prefix)
+        text = "".join(_heading(model, source)) + fill(body, prefix)
         return Written(text.encode("ascii"))
     if activations:
         raise ValueError("activations are those of fuzzy systems")
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, "c float32", lost)
-    code = CFile(model, _NUMBERS[dtype], prefix, probabilities=probabilities)
+    code = CFile(
+        model, _NUMBERS[dtype], prefix, probabilities=probabilities, source=source
+    )
     return Written("".join(code.text(selftest=selftest)).encode("ascii"), lost)
 
 
@@ -253,9 +256,11 @@ class CFile(CModel):
         prefix: str,
         *,
         probabilities: bool = False,
+        source: str | None = None,
     ) -> None:
         super().__init__(model, numbers)
         self.prefix = prefix
+        self.source = source or fingerprint(model)
         self.probabilities = probabilities
 
     def text(self, *, selftest: bool) -> Iterator[str]:
@@ -269,7 +274,7 @@ class CFile(CModel):
 
     def declarations(self) -> Iterator[str]:
         """Yield the heading and what users of the file see, open at the end."""
-        yield from _heading(self.model)
+        yield from _heading(self.model, self.source)
         yield self._fill(_USE) + self._fill(_DECLARE)
         yield from self._declarations()
 
@@ -347,10 +352,10 @@ def has_own_values(variables: Sequence[Variable]) -> bool:
     return any(v.parts or v.missing is not None for v in variables)
 
 
-def _heading(model: Document) -> Iterator[str]:
+def _heading(model: Document, source: str) -> Iterator[str]:
     title = title_of(model, f'"{remark(model.name)}"')
     yield f"/* {title}. Written by fuzzytree.\n"
-    yield f" * Fingerprint: {fingerprint(model)}\n *\n * Inputs, in order:\n"
+    yield f" * Fingerprint: {source}\n *\n * Inputs, in order:\n"
     inputs = [one for one in model.variables if not one.parts]
     for place, variable in enumerate(inputs):
         yield f" *   x[{place}] {_described(variable)}\n"

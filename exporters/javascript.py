@@ -35,6 +35,7 @@ from fuzzytree.exporters.program_text import (
     check_rated,
     node_rows,
     places_of,
+    source_of,
     system_examples,
     title_of,
 )
@@ -48,7 +49,6 @@ from fuzzytree.model import (
     SystemOutput,
     Variable,
     Written,
-    fingerprint,
     sentence,
 )
 from fuzzytree.semantics import (
@@ -102,6 +102,7 @@ def write(
         >>> print(write(random_tree(0)).content.decode("ascii").splitlines()[0])
         /* A fuzzy tree, named "random 7". Written by fuzzytree. */
     """
+    source = source_of(write, model, locals())
     del allow_loss
     if probabilities:
         check_rated(model, "javascript")
@@ -114,7 +115,7 @@ def write(
         body += ending + MAIN
     title = title_of(model, text_of(model.name))
     heading = f"/* {title}. Written by fuzzytree. */\n"
-    heading += f"/* Fingerprint: {fingerprint(model)} */\n"
+    heading += f"/* Fingerprint: {source} */\n"
     return Written(f"{heading}{body}".encode("ascii"))
 
 

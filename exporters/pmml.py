@@ -34,6 +34,7 @@ from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields, step_valu
 from fuzzytree.exporters.program_text import (
     check_rated,
     named_steps,
+    source_of,
     strengths_of,
     title_of,
 )
@@ -110,6 +111,7 @@ def write(
             raise refusal(model.name, "pmml", losses)
     if isinstance(model, FuzzySystem):
         return _written_system(model)
+    source = source_of(write, model, locals())
     names = _Names(model)
     functions = names.functions
     axes = [*_axes(model.variables, functions)]
@@ -124,7 +126,7 @@ def write(
     target = element("DataField", *values, name=names.target, **TEXT)
     data = element("DataDictionary", *_columns(model.variables), target)
     dictionary = element("TransformationDictionary", *transformations)
-    content = _content(_header(model), data, dictionary, body)
+    content = _content(_header(model, source), data, dictionary, body)
     return Written(content, losses)
 
 
@@ -197,9 +199,9 @@ class _Names:
         return result
 
 
-def _header(model: Model) -> XmlElement:
+def _header(model: Model, source: str) -> XmlElement:
     facts = {
-        "fingerprint": fingerprint(model),
+        "fingerprint": source,
         "uncovered": _answer(model.semantics.uncovered),
         "missing": _answer(model.semantics.missing),
         "and": model.semantics.conjunction,

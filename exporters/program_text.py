@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
+from urllib.parse import quote, unquote
 
 import numpy as np
 from msgspec.structs import replace
@@ -17,6 +19,8 @@ from fuzzytree.model import (
     Node,
     RuleBase,
     Variable,
+    Written,
+    fingerprint,
     intervals,
 )
 from fuzzytree.numerics import rounded
@@ -80,6 +84,36 @@ def title_of(model: Document, name: str) -> str:
     """Return what a file is of, with the model's name as the file may write it."""
     kinds = {FuzzyTree: "tree", RuleBase: "rule base", FuzzySystem: "system"}
     return f"A fuzzy {kinds[type(model)]}, named {name}"
+
+
+def source_of(
+    write: Callable[..., Written], model: Document, options: Mapping[str, Any]
+) -> str:
+    """Return what a file is written of: the fingerprint, and unusual options.
+
+    Values are quoted as in a URL, so that they end no comment of any language.
+    `options` are the arguments of `write`, others among them.
+    """
+    texts: list[str] = []
+    for name, usual in (write.__kwdefaults__ or {}).items():
+        value = options[name]
+        if value != usual and name != "allow_loss":
+            text = ",".join(value) if isinstance(value, list | tuple) else str(value)
+            texts.append(f"{name}={quote(text, '')}")
+    return fingerprint(model) + (f" Options: {';'.join(texts)}" if texts else "")
+
+
+def stated_options(content: bytes) -> dict[str, str]:
+    """Return the options that a file states, as `convert --set` takes them.
+
+    Example:
+        >>> stated_options(b"9" * 64 + b" Options: table=my%20rows;dialect=spark")
+        {'table': 'my rows', 'dialect': 'spark'}
+    """
+    line = re.search(rb"[0-9a-f]{64} Options: ([\w.%~=;-]+)", content)
+    parts = line[1].decode("ascii", "replace").split(";") if line else ()
+    pairs = (part.partition("=") for part in parts)
+    return {name: unquote(text) for name, _, text in pairs}
 
 
 def one_line(text: str, pairs: Sequence[str]) -> str:

@@ -58,9 +58,18 @@ _RULES = """
 
 def answer(values):
     \"\"\"Return class, rule number, status and strengths for the inputs in order.\"\"\"
-    place, rule, status, *strengths = numbers([float(value) for value in values])
+    place, rule, status, *strengths = numbers(@values@)
     label = None if place < 0.0 else CLASSES[int(place)]
     return label, int(rule), int(status), strengths
+"""
+
+_NUMBER = """
+
+def number(value, names):
+    \"\"\"Return a number; of a category its place, of an unknown one NaN.\"\"\"
+    if isinstance(value, str) and names:
+        return float(names.index(value)) if value in names else math.nan
+    return float(value)
 """
 
 _TEST = """
@@ -80,7 +89,7 @@ def write_python(model: Model, /, *, allow_loss: bool = False) -> Written:
     The file offers `decide(...)`, which takes each input by name and returns class
     (or None), rule number (0 for none) and status; for a rule base also
     `strengths(...)`; and `answer(values)` for the inputs in order. Run as a program it
-    tests itself.
+    tests itself. A category is its name, or its place among the categories.
 
     Args:
         model: A tree or a rule base.
@@ -100,6 +109,7 @@ def write_python(model: Model, /, *, allow_loss: bool = False) -> Written:
             *_heading(model),
             _START,
             *_lines("INPUTS", (_literal(v.name) + f",  # {v.unit!r}" for v in inputs)),
+            *_categories(inputs),
             *(_tree(model) if isinstance(model, FuzzyTree) else _rules(model)),
             *_doors(inputs, has_strengths=isinstance(model, RuleBase)),
             *_lines("EXAMPLES", _examples(model), gap="\n\n"),
@@ -156,7 +166,7 @@ def _tree(tree: FuzzyTree) -> Iterator[str]:
     steps = _Steps(program)
     yield "\n\ndef answer(values):\n"
     yield '    """Return class, leaf number and status for the inputs in order."""\n'
-    yield "    x = [float(value) for value in values]\n"
+    yield f"    x = {_values(tree)}\n"
     yield from steps.body()
     yield f"    axes = [{', '.join(map(steps.value, program.of('output')))}]\n"
     yield _TREE.replace("@missing@", repr(tree.semantics.missing))
@@ -179,7 +189,22 @@ def _rules(rules: RuleBase) -> Iterator[str]:
         yield f"        {steps.value(place)},  # {sentence(rule)!r}\n"
     yield "    ]\n"
     yield from steps.helpers()
-    yield _RULES
+    yield _RULES.replace("@values@", _values(rules))
+
+
+def _values(model: Model) -> str:
+    """Return what makes numbers of the values of the inputs."""
+    if any(variable.categories for variable in model.variables):
+        return "[*map(number, values, CATEGORIES)]"
+    return "[float(value) for value in values]"
+
+
+def _categories(inputs: Sequence[Variable]) -> Iterator[str]:
+    """Yield the categories of each input, if there are any."""
+    if any(variable.categories for variable in inputs):
+        names = (f"{_literal(one.categories)},  # {one.name!r}" for one in inputs)
+        yield from _lines("CATEGORIES", names)
+        yield _NUMBER
 
 
 class _Steps(ScriptSteps):

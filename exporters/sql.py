@@ -19,6 +19,7 @@ from fuzzytree.exporters.program_text import (
     StepText,
     check_rated,
     named_steps,
+    source_of,
     strengths_of,
     title_of,
 )
@@ -31,7 +32,6 @@ from fuzzytree.model import (
     RuleBase,
     Variable,
     Written,
-    fingerprint,
     parts_of,
     sentence,
     squarings,
@@ -88,6 +88,7 @@ def write(
         >>> "FROM grasps" in text
         True
     """
+    source = source_of(write, model, locals())
     del allow_loss
     known = get_args(Dialect)
     if dialect not in known:
@@ -113,7 +114,9 @@ def write(
             raise ValueError("sql: a tree has no strengths; its rules have")
         _refuse_deep(model)
         steps = _tree_steps(query, model)
-    text = "\n".join([*_heading(model, dialect), *_axes(query, model), *steps, ""])
+    text = "\n".join(
+        [*_heading(model, dialect, source), *_axes(query, model), *steps, ""]
+    )
     remark = (
         "PostgreSQL raises an error where a number overflows or a product underflows, "
         "and other engines go on"
@@ -136,9 +139,9 @@ def _refuse_deep(tree: FuzzyTree) -> None:
                 depths[branch.node] = here
 
 
-def _heading(model: Model, dialect: str) -> Iterator[str]:
+def _heading(model: Model, dialect: str, source: str) -> Iterator[str]:
     yield f"-- {title_of(model, repr(model.name))}, in SQL for {dialect}."
-    yield f"-- Written by fuzzytree. Fingerprint: {fingerprint(model)}"
+    yield f"-- Written by fuzzytree. Fingerprint: {source}"
     yield f"-- Classes: {', '.join(map(repr, model.classes))}"
     yield "-- status: 0 decided, 1 tie, 2 uncovered, 3 missing"
 

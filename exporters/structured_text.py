@@ -16,7 +16,7 @@ from typing import Literal
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.program_text import targets_of
+from fuzzytree.exporters.program_text import source_of, targets_of
 from fuzzytree.exporters.st_steps import RuleSteps, SystemSteps, decision
 from fuzzytree.exporters.st_text import (
     LONG,
@@ -41,7 +41,6 @@ from fuzzytree.model import (
     SystemOutput,
     Variable,
     Written,
-    fingerprint,
     stand_ins,
 )
 from fuzzytree.semantics import from_system
@@ -85,10 +84,11 @@ def write(
         >>> print(write(random_tree(0)).content.decode("ascii").splitlines()[2])
         FUNCTION_BLOCK random_7
     """
+    source = source_of(write, model, locals())
     del allow_loss
     numbers = LONG if dtype == "float64" else SINGLE
     if isinstance(model, FuzzySystem):
-        return _written_system(model, numbers, name)
+        return _written_system(model, numbers, name, source)
     mixed = [variable for variable in model.variables if variable.parts]
     combined = {variable.name: f"mix_{k}" for k, variable in enumerate(mixed, 1)}
     taken = _taken(model, combined)
@@ -117,18 +117,22 @@ def write(
         *_guard(model, values, mixed, combined, numbers),
         *body,
     ]
-    return _written(model, (given, block), names, lines)
+    return _written(model, source, (given, block), names, lines)
 
 
 def _written(
-    model: Document, block: tuple[str, str], names: NameMap, lines: Sequence[str]
+    model: Document,
+    source: str,
+    block: tuple[str, str],
+    names: NameMap,
+    lines: Sequence[str],
 ) -> Written:
     """Return a function block; its name may differ from the one it should have."""
     given, name = block
     text = "".join(
         [
             f"(* Written by fuzzytree: {remark(model.name)} *)\n",
-            f"(* Fingerprint: {fingerprint(model)} *)\n",
+            f"(* Fingerprint: {source} *)\n",
             f"FUNCTION_BLOCK {name}\n",
             *lines,
             "END_IF;\nEND_FUNCTION_BLOCK\n",
@@ -298,7 +302,9 @@ def _depth(tree: FuzzyTree) -> int:
 _FIXED = ("is_number", "status", "is_known", "k", "halves")
 
 
-def _written_system(system: FuzzySystem, numbers: StNumbers, name: str) -> Written:
+def _written_system(
+    system: FuzzySystem, numbers: StNumbers, name: str, source: str
+) -> Written:
     """Return a system as a function block, in ASCII.
 
     Raises:
@@ -337,7 +343,7 @@ def _written_system(system: FuzzySystem, numbers: StNumbers, name: str) -> Writt
         "ELSE\n",
         *body,
     ]
-    written = _written(system, (given, block), names, lines)
+    written = _written(system, source, (given, block), names, lines)
     note = "an output without a number is 0 and its `is_number` is FALSE"
     return replace(written, remarks=(*written.remarks, note))
 

@@ -396,6 +396,7 @@ def check(
         runtimes=runtimes,
         limit=chosen.limit,
         rows_only=chosen.rows_only,
+        terms=chosen.terms,
         progress=progress,
     )
 

@@ -13,7 +13,9 @@ from fuzzytree.model import (
     BoolArray,
     Certified,
     Comparison,
+    Document,
     Dtype,
+    FileContent,
     FloatArray,
     FuzzyTree,
     IntArray,
@@ -21,6 +23,7 @@ from fuzzytree.model import (
     Outcome,
     RuleBase,
     Verdict,
+    kind_of,
 )
 from fuzzytree.numerics import (
     Decisions,
@@ -36,8 +39,21 @@ _SHOWN = 5  # differing rows listed for each comparison
 _LISTED = 20  # differences in the content of a file
 _FLOAT32_TREE = "equal answers but within float32 rounding of a cut"
 
-Finding = Comparison | str
-"""A comparison, or a sentence about what was skipped."""
+Finding = Comparison | FileContent | str
+"""A comparison, what a file holds, or a sentence about what was skipped."""
+
+OTHER_FUNCTION = (
+    "it holds raw rules, another function than the tree; --terms raw compares it with "
+    "the tree's own raw rules"
+)
+
+
+def file_content(title: str, model: Document, dtype: object = "float64") -> FileContent:
+    """Return what a file holds, as people call it."""
+    form: str = kind_of(model)
+    if isinstance(model, RuleBase) and model.kind:
+        form = f"{model.kind} {form}"
+    return FileContent(title, form, str(dtype))
 
 
 class RowSet(msgspec.Struct, frozen=True):

@@ -10,6 +10,7 @@ import numpy as np
 
 from fuzzytree import semantics
 from fuzzytree.checking.comparing import (
+    OTHER_FUNCTION,
     FileAnswers,
     Finding,
     ModelRun,
@@ -75,8 +76,10 @@ class CheckedModel:
     noun = base = "the model"
     coverage = None
 
-    def __init__(self, model: Model, data: FloatArray | None, limit: int) -> None:
-        self.model = model
+    def __init__(
+        self, model: Model, data: FloatArray | None, limit: int, terms: Kind
+    ) -> None:
+        self.model, self.terms = model, terms
         self.rows = probed(model, data, limit)
         native = baseline().load
         self.forms = {str(title): form for title, form in forms(model).items()}
@@ -165,7 +168,7 @@ class CheckedModel:
 
     def shipped(self, title: str, other: Any) -> Iterator[Finding]:
         """Compare a file that is read as a model: its content, then its answers."""
-        yield from _shipped(title, other, self.model, self.rows)
+        yield from _shipped(title, other, self.model, self.rows, self.terms)
 
     def foreign(self, file: OnnxModel) -> str | None:
         """Return why an ONNX file cannot be one of this model; None if it can be."""
@@ -180,12 +183,11 @@ class CheckedModel:
 
     def counterpart(self, file: OnnxModel) -> Model | str:
         """Return the form that an ONNX file should hold, or why there is none."""
-        has_raw = isinstance(self.model, FuzzyTree) and self.model.sets
-        kind: Kind = "raw" if file.kind == "raw" and has_raw else "relative"
-        is_tree = file.representation == "tree"
+        kind: Kind | None = "raw" if file.kind == "raw" else "relative"
+        kind = None if file.representation == "tree" else kind
         conjunction = file.semantics.conjunction
-        form = _counterpart(self.model, conjunction, None if is_tree else kind)
-        return form or _no_counterpart(self.model)
+        form = _counterpart(self.model, conjunction, kind, self.terms)
+        return form or _no_counterpart(self.model, self.terms)
 
     def file_rows(self, title: str, file: OnnxModel) -> Iterator[Finding]:
         """Compare the answers of an ONNX file with the native ones.
@@ -265,11 +267,13 @@ def _contract(
     return compare_bits(actual, base, rows)
 
 
-def _shipped(title: str, other: Model, model: Model, rows: RowSet) -> Iterator[Finding]:
+def _shipped(
+    title: str, other: Model, model: Model, rows: RowSet, terms: Kind
+) -> Iterator[Finding]:
     if isinstance(other, FuzzyTree) and not isinstance(model, FuzzyTree):
         other = _as_rules(other, model) or other
     kind = None if isinstance(other, FuzzyTree) else other.kind or "relative"
-    expected = _counterpart(model, other.semantics.conjunction, kind)
+    expected = _counterpart(model, other.semantics.conjunction, kind, terms)
     for what, one, two in (
         ("inputs", other.inputs, model.inputs),
         ("classes", sorted(other.classes), sorted(model.classes)),
@@ -285,7 +289,7 @@ def _shipped(title: str, other: Model, model: Model, rows: RowSet) -> Iterator[F
     is_like = expected is not None and other.classes == model.classes
     answers = (compare_bits if is_like else compare_answers)(actual, base, rows)
     if expected is None:
-        yield judged(title, "the model", (_no_counterpart(model),), [answers])
+        yield judged(title, "the model", (_no_counterpart(model, terms),), [answers])
     else:
         yield _content(title, other, expected, [answers])
     yield answers
@@ -298,22 +302,24 @@ def _as_rules(tree: FuzzyTree, model: RuleBase) -> RuleBase | None:
     return rules_from_tree(tree, model.kind, conjunction=model.semantics.conjunction)
 
 
-def _no_counterpart(model: Model) -> str:
+def _no_counterpart(model: Model, terms: Kind) -> str:
     if isinstance(model, FuzzyTree):
+        if terms != "raw":
+            return OTHER_FUNCTION
         return "raw rules cannot be made of a tree without fitted sets"
     return "it is a tree, and no tree can be made of rules"
 
 
 def _counterpart(
-    model: Model, conjunction: Conjunction, kind: Kind | None
+    model: Model, conjunction: Conjunction, kind: Kind | None, terms: Kind
 ) -> Model | None:
     """Return the tree (kind None) or the rules that a file should hold.
 
-    None if they cannot be made from the model.
+    None if they cannot be made from the model, or are raw where they should not be.
     """
     if not isinstance(model, FuzzyTree):
         return model if kind else None
-    if kind == "raw" and not model.sets:
+    if kind == "raw" and not (model.sets and terms == "raw"):
         return None
     return rules_from_tree(model, kind, conjunction=conjunction) if kind else model
 

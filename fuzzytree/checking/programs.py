@@ -7,51 +7,42 @@ what this version writes of the model, or if the user says so.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple, cast
 
 import msgspec
+import numpy as np
 
 from fuzzytree.checking.comparing import (
+    OTHER_FUNCTION,
     FileAnswers,
     Finding,
     RowSet,
     compare_file,
     counted,
+    file_content,
     judged,
     native_base,
 )
-from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.exporters import find_format
+from fuzzytree.errors import FuzzyTreeError, MissingExtraError
+from fuzzytree.exporters import find_format, stated_options
 from fuzzytree.model import (
     Comparison,
     Document,
     Format,
     FuzzySystem,
     FuzzyTree,
+    Kind,
     Model,
+    RuleBase,
     Written,
+    option_value,
 )
 from fuzzytree.runtimes import ENGINES, Options
 from fuzzytree.semantics import forms, rules_from_tree
 
 _MOST_ROWS: Final = 2_000  # that a program answers
 _LONGEST: Final = 80  # characters of a line
-_FLOAT32: Final = {"dtype": "float32"}
-_RATED: Final = {"probabilities": True}
-_OPTIONS: Final[Mapping[str, tuple[Options, ...]]] = {
-    "c": ({}, _FLOAT32, _RATED, {**_FLOAT32, **_RATED}),
-    "javascript": ({}, {"module": "script"}, _RATED, {"module": "script", **_RATED}),
-    "pmml": ({}, {"curves": "points"}, _RATED, {"curves": "points", **_RATED}),
-    "sql": tuple(
-        {"dialect": dialect, "strengths": has_strengths, "probabilities": is_rated}
-        for is_rated in (False, True)
-        for dialect in ("sqlite", "duckdb", "postgresql", "spark")
-        for has_strengths in (False, True)
-    ),
-    "structured-text": ({}, _FLOAT32),
-}
-"""The options with which a file is written for comparison, the usual ones first."""
 
 
 class ProgramFile(msgspec.Struct, frozen=True):
@@ -83,21 +74,30 @@ class _Text(NamedTuple):
 
 
 def check_program(
-    title: str, program: ProgramFile, model: Document, rows: RowSet
+    title: str, program: ProgramFile, model: Document, rows: RowSet, terms: Kind
 ) -> Iterator[Finding]:
     """Compare a program with what is written now; run it if they are equal.
+
+    Raw rules of a tree must be wanted as `terms`.
 
     Raises:
         MissingExtraError: If an engine is missing.
     """
     form = find_format(program.format)
     lines = program.content.splitlines(keepends=True)
-    nearest = _nearest(form, model, lines)
-    if nearest is None:
-        fault = f"the model cannot be written as {form.name}"
+    try:
+        stated = stated_options(program.content).items()
+        options = {name: option_value(form, name, text) for name, text in stated}
+        nearest = _nearest(form, model, lines, options)
+    except ValueError as error:
+        fault = f"the model cannot be written as {form.name}: {error}"
         yield counted("file", title, "a freshly written file", 1, (fault,))
         return
+    yield file_content(title, nearest.form, options.get("dtype", "float64"))
     faults = tuple(_faults(nearest.lines, lines))
+    is_raw = isinstance(nearest.form, RuleBase) and nearest.form.kind == "raw"
+    if is_raw and isinstance(model, FuzzyTree) and terms != "raw":
+        faults = (OTHER_FUNCTION, *faults)
     why = _why_not(nearest, form)
     results: list[Comparison] = []
     if not faults or program.may_run:
@@ -111,16 +111,21 @@ def check_program(
     yield from results
 
 
-def _nearest(form: Format, model: Document, lines: list[bytes]) -> _Text | None:
-    """Return the text that a file equals, or else that shares the most first lines."""
+def _nearest(
+    form: Format, model: Document, lines: list[bytes], options: Options
+) -> _Text:
+    """Return the text that a file equals, or else that shares the most first lines.
+
+    Raises:
+        ValueError: If nothing can be written with the options.
+    """
     write = cast("Callable[..., Written]", form.write)  # the options are its own
     best, most = None, -1
-    for document, options in itertools.product(
-        _documents(model), _OPTIONS.get(form.name, ({},))
-    ):
+    for document in _documents(model):
         try:
             written = write(document, allow_loss=True, **options)
-        except (LossError, ValueError):
+        except ValueError as error:
+            fault = error
             continue
         text = written.content.splitlines(keepends=True)
         same = (one == two for one, two in zip(text, lines, strict=False))
@@ -129,6 +134,8 @@ def _nearest(form: Format, model: Document, lines: list[bytes]) -> _Text | None:
             return _Text(document, options, text)
         if shared > most:
             best, most = _Text(document, options, text), shared
+    if best is None:
+        raise fault
     return best
 
 
@@ -172,6 +179,8 @@ def _why_not(text: _Text, form: Format) -> str | None:
         return f"no engine for SQL of the dialect {dialect} is known here"
     if text.options.get("module") == "script":
         return "only JavaScript modules are run"
+    if text.options.get("keep"):
+        return "a query runs here if it gives the inputs, and no other columns"
     if text.options.get("curves") == "points":
         return "PMML whose curves became points is another function"
     return None
@@ -182,6 +191,8 @@ def _run(
 ) -> Iterator[Comparison]:
     """Run a program, and compare its answers with those of the form it was made of."""
     model = cast("Model", text.form)  # no system: see `_why_not`
+    if program.format == "sql":
+        rows = _table_rows(model, rows)
     some = rows.part(slice(None, None, -(-len(rows.numbers) // _MOST_ROWS)))
     is_single = text.options.get("dtype") == "float32"
     base = native_base(model, "float32" if is_single else "float64", some)
@@ -191,7 +202,7 @@ def _run(
         )
     except MissingExtraError as error:
         raise MissingExtraError(f"{title}: {error}") from error
-    except FuzzyTreeError as error:
+    except (FuzzyTreeError, ValueError, LookupError) as error:
         faults = ("; ".join(str(error).splitlines()),)
         yield counted("rows", title, "the model", len(some.numbers), faults)
         return
@@ -203,3 +214,14 @@ def _run(
         is_float32=is_single,
         origin="equal but within float32",
     )
+
+
+def _table_rows(model: Model, rows: RowSet) -> RowSet:
+    """Return rows as a table of SQL can hold them: of categories those with a name."""
+    values = rows.values.copy()
+    inputs = [variable for variable in model.variables if not variable.parts]
+    for line, variable in enumerate(inputs):
+        if variable.categories:
+            places = np.rint(values[line])
+            values[line] = np.clip(places, 0, len(variable.categories) - 1)
+    return msgspec.structs.replace(rows, values=values)

@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.comparing import Finding, RowSet, counted, judged
+from fuzzytree.checking.comparing import (
+    Finding,
+    RowSet,
+    counted,
+    file_content,
+    judged,
+)
 from fuzzytree.checking.models import CheckedModel
 from fuzzytree.checking.programs import ProgramFile, check_program
 from fuzzytree.checking.systems import CheckedSystem
@@ -26,9 +32,11 @@ from fuzzytree.model import (
     Comparison,
     Count,
     Document,
+    FileContent,
     FloatArray,
     FuzzySystem,
     FuzzyTree,
+    Kind,
     Outcome,
     Progress,
     RuleBase,
@@ -60,6 +68,7 @@ def check(
     runtimes: Sequence[str] | None = None,
     limit: int | None = None,
     rows_only: bool = False,
+    terms: Kind = "relative",
     progress: Progress | None = None,
 ) -> Agreement:
     """Compare every representation of a model with the model itself.
@@ -74,6 +83,7 @@ def check(
         runtimes: The names of the runtimes to run; all that are installed if None.
         limit: The most probes; as in `CheckSettings` if None.
         rows_only: Whether files whose rows agree are accepted with other content.
+        terms: As in `CheckSettings`.
         progress: Called with what is compared next and the share that is done.
 
     Returns:
@@ -98,7 +108,7 @@ def check(
     if isinstance(model, FuzzySystem):
         subject = CheckedSystem(model, data, limit or MOST_SYSTEM_PROBES)
     else:
-        subject = CheckedModel(model, data, limit or MOST_PROBES)
+        subject = CheckedModel(model, data, limit or MOST_PROBES, terms)
     chosen = chosen_runtimes(runtimes)
     steps = [(form, runtime) for form in subject.outcomes for runtime in chosen]
     parts = len(steps) + len(files)
@@ -110,7 +120,7 @@ def check(
     for number, (title, other) in enumerate(files, len(steps)):
         if progress:
             progress(f"comparing {title}", number / parts)
-        findings += _shipped(subject, title, other)
+        findings += _shipped(subject, title, other, terms)
     return Agreement(
         model.name,
         fingerprint(model),
@@ -122,6 +132,7 @@ def check(
         tuple(subject.certificates(chosen)),
         rows_only,
         subject.coverage,
+        tuple(one for one in findings if isinstance(one, FileContent)),
     )
 
 
@@ -197,18 +208,23 @@ def _calls(title: str, subject: Checked, run: Any, rows: RowSet) -> Comparison:
     return counted("calls", title, "itself", count + 3, faults)
 
 
-def _shipped(subject: Checked, title: str, other: Shipped) -> Iterator[Finding]:
+def _shipped(
+    subject: Checked, title: str, other: Shipped, terms: Kind
+) -> Iterator[Finding]:
     """Compare a file that was shipped beside a model: its content, then its answers."""
     if isinstance(other, ProgramFile):
-        yield from check_program(title, other, subject.model, subject.rows)
+        yield from check_program(title, other, subject.model, subject.rows, terms)
     elif isinstance(other, OnnxModel):
         yield from _shipped_onnx(subject, title, other)
     else:
+        yield file_content(title, other)
         yield from subject.shipped(title, other)
 
 
 def _shipped_onnx(subject: Checked, title: str, file: OnnxModel) -> Iterator[Finding]:
     """Compare an ONNX file: what it says of itself, its graph, and its answers."""
+    forms = {"descent": "tree", "relative": "relative rules", "raw": "raw rules"}
+    yield FileContent(title, forms.get(file.kind, file.kind), file.dtype)
     fault = subject.foreign(file)
     if fault is not None:
         yield counted("file", title, f"{subject.noun}'s facts", 1, (fault,))

@@ -22,6 +22,7 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
+from fuzzytree.model import Kind
 
 
 class CheckOptions(TableOptions, FullResultOptions):
@@ -39,6 +40,13 @@ class CheckOptions(TableOptions, FullResultOptions):
     rows_only: bool = rows_only_option
     run_code: bool = flag(
         "--run-code", "Run a program file although its text differs from a new one."
+    )
+    terms: Kind = option(
+        "--terms",
+        "Rules that a file may hold beside a tree: those that equal it, or the "
+        "paper's too.",
+        choices=["relative", "raw"],
+        default="relative",
     )
     allow_loss: bool = allow_loss_option
 
@@ -67,6 +75,7 @@ def command(options: CheckOptions) -> int:
                 limit=options.limit,
                 rows_only=options.rows_only,
                 run_code=options.run_code,
+                terms=options.terms,
             ),
             allow_loss=options.allow_loss,
             progress=show,

@@ -37,6 +37,7 @@ from fuzzytree.model import (
     Document,
     Format,
     Reading,
+    RuleBase,
     Written,
 )
 
@@ -192,7 +193,9 @@ def carry(
         write_atomically(chosen.output, written.content)
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
-    after = next_check((source, read_as), (chosen.output, form.name))
+    is_raw = isinstance(model, RuleBase) and model.kind == "raw"
+    more = ("--terms", "raw") if is_raw and model is not found.model else ()
+    after = next_check((source, read_as), (chosen.output, form.name), more=more)
     if after and found.losses:
         after += " --allow-loss"
     if kind_of(model) == "system" != kind_of(found.model):

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import msgspec
 
 from fuzzytree.errors import DisagreementError
+from fuzzytree.model.rulebase import Kind
 
 Basis = Literal["file", "proof", "all cells", "rows", "calls"]
 Verdict = Literal["agrees", "rows only", "DISAGREES", "differs by design"]
@@ -157,6 +158,20 @@ MOST_PROBES, MOST_SYSTEM_PROBES = 20_000, 2_000
 """Of a tree or rules, and of a fuzzy system, whose rows cost more."""
 
 
+class FileContent(msgspec.Struct, frozen=True):
+    """What a file that was compared holds.
+
+    Attributes:
+        file: What the file is called.
+        form: `tree`, `relative rules`, `raw rules`, `rules` or `system`.
+        dtype: The number type in which it computes.
+    """
+
+    file: str
+    form: str
+    dtype: str
+
+
 class CheckSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How far a check goes.
 
@@ -166,11 +181,14 @@ class CheckSettings(msgspec.Struct, frozen=True, kw_only=True):
             graph that this version would not write, or a system with other numbers.
         run_code: Whether a program (C, Python, JavaScript, SQL, PMML) is run even if
             its text is not what this version writes of the model.
+        terms: Whether the file of a tree may hold `raw` rules, another function than
+            the tree; tree and `relative` rules may always stand in it.
     """
 
     limit: int | None = None
     rows_only: bool = False
     run_code: bool = False
+    terms: Kind = "relative"
 
 
 class Agreement(msgspec.Struct, frozen=True):
@@ -187,6 +205,7 @@ class Agreement(msgspec.Struct, frozen=True):
         certificates: What each number type that was run can change, and did.
         rows_only: Whether the verdict `rows only` is accepted.
         coverage: Of a fuzzy system: which rules probes fire, and what is uncovered.
+        files: What each file holds.
     """
 
     FORMAT: ClassVar[str] = "fuzzytree-check/1"
@@ -201,6 +220,7 @@ class Agreement(msgspec.Struct, frozen=True):
     certificates: tuple[Certified, ...] = ()
     rows_only: bool = False
     coverage: Coverage | None = None
+    files: tuple[FileContent, ...] = ()
 
     @property
     def ok(self) -> bool:

@@ -137,6 +137,8 @@ def agreement_lines(agreement: Agreement, *, is_verbose: bool = False) -> Iterat
         if comparison.detail and (is_verbose or comparison in wrong):
             yield f"{comparison.representation} compared with {comparison.against}:"
             yield from (f"  {line}" for line in comparison.detail)
+    for file in agreement.files:
+        yield f"{file.file} holds: {file.form}, {file.dtype}"
     for count in agreement.counts:
         yield (
             f"{count.representation}: {counted(count.rows, 'row')}, {count.ties} tied, "

@@ -9,6 +9,7 @@ import importlib
 import importlib.util
 import json
 import math
+import operator
 import shutil
 import sqlite3
 import subprocess
@@ -17,13 +18,14 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 
+from fuzzytree.columns import BOOLEANS
 from fuzzytree.errors import FuzzyTreeError, MissingExtraError
 from fuzzytree.exporters import beginning
-from fuzzytree.model import FloatArray, Model, Option, Outcome, RuleBase
+from fuzzytree.model import FloatArray, Model, Option, Outcome, RuleBase, Variable
 from fuzzytree.runtimes import c
 from fuzzytree.runtimes.rows import outcome_of
 from fuzzytree.semantics import Status
@@ -153,7 +155,8 @@ def _c(
     content: bytes, model: Model, options: Options, values: FloatArray
 ) -> ProgramOutcome:
     dtype: c.Dtype = "float32" if options.get("dtype") == "float32" else "float64"
-    run = c.load_content(content, model, dtype, prefix=beginning(model.name, None))
+    name = cast("str | None", options.get("name"))
+    run = c.load_content(content, model, dtype, prefix=beginning(model.name, name))
     return ProgramOutcome(run(values), None)
 
 
@@ -168,16 +171,8 @@ def _sql(
         connection, failure = duckdb.connect(), duckdb.Error
     else:
         connection, failure = sqlite3.connect(":memory:"), sqlite3.Error
-    kind = "DOUBLE" if dialect == "duckdb" else "REAL"
     try:
-        return _queried(
-            connection,
-            content,
-            model,
-            kind,
-            values,
-            has_probabilities=_is_rated(options),
-        )
+        return _queried(connection, content, model, options, values)
     except failure as error:
         text = f"{dialect} cannot run it: {str(error).splitlines()[0]}"
         raise FuzzyTreeError(text) from error
@@ -189,25 +184,48 @@ def _queried(
     connection: Any,
     content: bytes,
     model: Model,
-    kind: str,
+    options: Options,
     values: FloatArray,
-    *,
-    has_probabilities: bool,
 ) -> ProgramOutcome:
-    quoted = ['"' + name.replace('"', '""') + '"' for name in model.inputs]
-    columns = ", ".join(f"{name} {kind}" for name in quoted)
-    connection.execute(f"CREATE TABLE data ({columns})")
-    marks = ", ".join("?" * len(quoted))
-    connection.executemany(f"INSERT INTO data VALUES ({marks})", values.T.tolist())
-    cursor = connection.execute(content.decode("utf-8"))
-    result = cursor.fetchall()
-    width = len(quoted)
-    kept = np.array([row[:width] for row in result], np.float64).reshape(-1, width)
-    if not np.array_equal(kept, values.T, equal_nan=True):
+    """Return the answers of a query to a table with rows, categories as their names."""
+    inputs = [one for one in model.variables if not one.parts]
+    table = _quoted(str(options.get("table", "data")))
+    columns = ", ".join(f"{_quoted(one.name)} {_column_type(one)}" for one in inputs)
+    connection.execute(f"CREATE TABLE {table} ({columns})")
+    marks, width = ", ".join("?" * len(inputs)), len(inputs)
+    rows = [*zip(*map(_cells, inputs, values.tolist()), strict=True)]
+    connection.executemany(f"INSERT INTO {table} VALUES ({marks})", rows)
+    result = connection.execute(content.decode("utf-8")).fetchall()
+    kept = ([*map(_known_cells, some)] for some in (rows, (r[:width] for r in result)))
+    if operator.ne(*kept):
         raise FuzzyTreeError("it does not give each row with its inputs, in order")
-    rows = [row[width + 1 :] for row in result]
-    outcome = outcome_of(model, rows, has_probabilities=has_probabilities)
+    answers = [row[width + 1 :] for row in result]
+    outcome = outcome_of(model, answers, has_probabilities=_is_rated(options))
     return ProgramOutcome(outcome, tuple(row[width] for row in result))
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
+
+
+def _column_type(variable: Variable) -> str:
+    if variable.categories:
+        return "BOOLEAN" if variable.categories == BOOLEANS else "VARCHAR"
+    return "DOUBLE"
+
+
+def _cells(variable: Variable, values: Sequence[float]) -> Sequence[object]:
+    """Return a column as a table has it: names of categories, or truth values."""
+    names = variable.categories
+    if not names:
+        return values
+    cells = (False, True) if names == BOOLEANS else names
+    return [None if value != value else cells[int(value)] for value in values]
+
+
+def _known_cells(row: Sequence[object]) -> tuple[object, ...]:
+    """Return the cells of a row, None for NaN."""
+    return tuple(None if cell != cell else cell for cell in row)
 
 
 def _pmml(
@@ -227,11 +245,12 @@ def _pmml(
     names = [f"strength of rule {k}" for k in range(1, count + 1)]
     is_rated = _is_rated(options)
     shares = [f"probability of class {c}" for c in model.classes if is_rated]
-    known = np.logical_and.reduce(np.isfinite(values), axis=0).tolist()
+    replaced = [[one.missing is not None] for one in model.variables if not one.parts]
+    known: list[bool] = np.all(np.isfinite(values) | replaced, axis=0).tolist()
     rows = []
     for place, line in enumerate(result.to_dict("records")):
-        is_none = line["rule"] is None or line["rule"] != line["rule"]
-        rule = 0 if is_none else int(line["rule"])
+        identifier = str(line["rule"])  # of a node: no number where no rule decides
+        rule = int(identifier) if identifier.isdecimal() else 0
         status = Status.DECIDED if rule else Status.UNCOVERED
         fired = [line[name] if known[place] else math.nan for name in names]
         rated = [line[name] if rule else math.nan for name in shares]

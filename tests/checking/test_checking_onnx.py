@@ -9,7 +9,7 @@ from onnx import helper, numpy_helper
 from fuzzytree.checking.representations import check
 from fuzzytree.errors import DisagreementError, ReadError
 from fuzzytree.exporters.onnx import Output, write_onnx
-from fuzzytree.model.agreement import Agreement
+from fuzzytree.model.agreement import Agreement, FileContent
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import Kind
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
@@ -20,8 +20,8 @@ TREE = random_tree(9, leaves=6, inputs=3, combinations=0.0)  # each leaf is reac
 ALL: tuple[Output, ...] = ("label", "rule", "strengths", "status")
 
 
-def checked(model: Model, shipped: OnnxModel) -> Agreement:
-    return check(model, shipped, names=["m.onnx"], runtimes=[], limit=2000)
+def checked(model: Model, shipped: OnnxModel, terms: Kind = "relative") -> Agreement:
+    return check(model, shipped, names=["m.onnx"], runtimes=[], limit=2000, terms=terms)
 
 
 def verdicts(agreement: Agreement) -> dict[str, str]:
@@ -46,12 +46,29 @@ def test_a_file_of_rules_agrees_with_its_tree_and_with_its_rules(
         write_onnx(rules, dtype=dtype, outputs=ALL, allow_loss=True).content
     )
     for model in (TREE, rules):
-        assert verdicts(checked(model, shipped)) == {
+        assert verdicts(checked(model, shipped, kind)) == {
             "the model's metadata": "agrees",
             "a freshly written graph": "agrees",
             "the model": "agrees",
             "the model's classes": "agrees",
         }
+
+
+def test_raw_rules_beside_a_tree_are_another_function_unless_wanted() -> None:
+    shipped = opened(write_onnx(rules_from_tree(TREE, "raw"), dtype="mixed").content)
+    agreement = checked(TREE, shipped)
+    assert agreement.files == (FileContent("m.onnx", "raw rules", "mixed"),)
+    assert verdicts(agreement) == {
+        "a freshly written graph": "DISAGREES",
+        "the model's classes": "DISAGREES",
+    }
+    (graph,) = (c for c in agreement.comparisons if c.basis == "file")
+    assert graph.detail == (
+        "it holds raw rules, another function than the tree; --terms raw compares it "
+        "with the tree's own raw rules",
+    )
+    assert checked(TREE, shipped, "raw").ok
+    assert checked(rules_from_tree(TREE, "raw"), shipped).ok
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32"])

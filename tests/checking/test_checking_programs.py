@@ -7,12 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.errors import MissingExtraError
-from fuzzytree.model.agreement import Agreement
+from fuzzytree.model.agreement import Agreement, FileContent
 from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import (
+    Band,
+    Proposition,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
 from fuzzytree.runtimes import written
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.samples import all_samples
@@ -66,12 +75,109 @@ def test_a_program_of_ours_is_run_and_agrees(
     if path == "m.sql" and isinstance(model, RuleBase):
         options = {**options, "strengths": True}
     ft.save(model, path, allow_loss=True, **options)
-    agreement = checked(TREE if model is RULES else model, path)
+    agreement = checked(TREE if model is RULES else model, path, terms="raw")
     first, rows, *classes = about(agreement, path)
     assert first == ("a freshly written file", "agrees")
     assert rows == ("the model", "agrees")
     assert classes == ([] if path == "m.c" else [("the model's classes", "agrees")])
     assert agreement.ok
+
+
+@pytest.mark.parametrize(
+    ("path", "options"),
+    [
+        ("m.c", {"name": "other", "selftest": False}),
+        ("m.sql", {"table": "my rows; --"}),
+        ("m.sql", {"dialect": "duckdb", "table": "t"}),
+        ("m.sql", {"keep": ["x1"]}),
+        ("m.st", {"name": "fb", "dtype": "float32"}),
+        ("m.js", {"module": "script"}),
+    ],
+)
+def test_a_program_agrees_whatever_options_it_was_written_with(
+    path: str, options: dict[str, Any]
+) -> None:
+    ft.save(TREE, path, allow_loss=True, **options)
+    agreement = checked(TREE, path)
+    assert agreement.ok
+    assert {verdict for _, verdict in about(agreement, path)} == {"agrees"}
+    assert agreement.files == (
+        FileContent(path, "tree", options.get("dtype", "float64")),
+    )
+
+
+def test_options_that_a_file_cannot_have_are_a_disagreement() -> None:
+    ft.save(TREE, "m.sql", table="t")
+    text = Path("m.sql").read_text("utf-8")
+    Path("m.sql").write_text(text.replace("table=t", "dialect=klingon"), "utf-8")
+    (one,) = (c for c in checked(TREE, "m.sql").comparisons if c.basis == "file")
+    assert one.detail == (
+        "the model cannot be written as sql: dialect: must be sqlite, duckdb, "
+        "postgresql, spark, not 'klingon'",
+    )
+
+
+@pytest.mark.parametrize("path", ["m.yaml", "m.py", "m.sql"])
+def test_raw_rules_of_a_tree_are_a_difference_unless_wanted(path: str) -> None:
+    ft.save(rules_from_tree(TREE, "raw"), path)
+    agreement = checked(TREE, path)
+    assert agreement.files == (FileContent(path, "raw rules", "float64"),)
+    (one,) = (
+        c
+        for c in agreement.comparisons
+        if c.basis == "file"
+        if c.representation == path
+    )
+    assert (one.verdict, one.detail[0]) == (
+        "DISAGREES",
+        "it holds raw rules, another function than the tree; --terms raw compares it "
+        "with the tree's own raw rules",
+    )
+    assert checked(TREE, path, terms="raw").ok
+
+
+CATEGORIES = RuleBase(
+    "places",
+    ("a", "b"),
+    (
+        Variable(
+            "region", (Term("far", Band(low=2.0)),), categories=("north", "o'er", "x;")
+        ),
+        Variable("is new", (Term("yes", Band(low=1.0)),), categories=("False", "True")),
+    ),
+    (
+        Rule((Proposition("region", ("far",)),), "a"),
+        Rule((Proposition("is new", ("yes",)),), "b"),
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("path", "options"), [("m.sql", {}), ("m.sql", {"dialect": "duckdb"}), ("m.py", {})]
+)
+def test_a_program_is_run_on_the_names_of_categories(
+    path: str, options: dict[str, Any]
+) -> None:
+    ft.save(CATEGORIES, path, **options)
+    agreement = checked(CATEGORIES, path)
+    assert agreement.ok
+    assert ("the model", "agrees") in about(agreement, path)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize(
+    "semantics",
+    [Semantics(missing="x"), Semantics(uncovered="x"), Semantics()],
+    ids=["missing", "uncovered", "stand-in"],
+)
+def test_pmml_with_an_answer_to_missing_values_agrees(semantics: Semantics) -> None:
+    stand_in = None if semantics.missing or semantics.uncovered else 0.5
+    variable = replace(ENDS.variables[0], missing=stand_in)
+    rules = replace(
+        ENDS, variables=(variable,), rules=ENDS.rules[:1], semantics=semantics
+    )
+    ft.save(rules, "m.pmml")
+    assert checked(rules, "m.pmml").ok
 
 
 @pytest.mark.one_in(2)

@@ -196,4 +196,4 @@ def test_a_file_without_its_test_is_the_same_up_to_there() -> None:
         whole = write_c(model, name="m").content
         bare = write_c(model, name="m", selftest=False).content
         begin, _, _ = whole.partition(b"\n#ifdef M_SELFTEST")
-        assert bare == begin + b"\n#endif\n"
+        assert bare.replace(b";selftest=False", b"", 1) == begin + b"\n#endif\n"

@@ -155,6 +155,27 @@ def test_the_file_tests_itself_and_reports_a_changed_number(tmp_path: Path) -> N
     assert "instead of" in done.stderr
 
 
+def test_a_category_is_its_name_or_its_place_and_an_unknown_one_is_missing() -> None:
+    terms = (Term("far", Band(low=0.5)),)
+    variables = (
+        Variable("region", terms, categories=("north", "south")),
+        Variable("size", terms),
+    )
+    rule = Rule((Proposition("region", ("far",)),), "a")
+    rules = RuleBase("r", ("a",), variables, (rule,))
+    space = executed(write_python(rules).content)
+    rows = [["south", 2.0], [1, 2.0], ["north", 2.0], ["west", 2.0]]
+    assert [space["answer"](row)[:3] for row in rows] == [
+        ("a", 1, 0),
+        ("a", 1, 0),
+        (None, 0, 2),
+        (None, 0, 3),
+    ]
+    assert space["decide"](region="south", size=2.0) == ("a", 1, 0)
+    with pytest.raises(ValueError, match="could not convert string to float: 'big'"):
+        space["answer"](["south", "big"])
+
+
 def test_a_single_leaf_without_inputs_can_be_written() -> None:
     tree = FuzzyTree("one", ("a",), (), (), (Leaf("a"),))
     assert executed(write_python(tree).content)["decide"]() == ("a", 1, 0)
