@@ -35,12 +35,13 @@ def check_stream(path: PathLike) -> None:
         raise OSError(None, "it is neither a file nor a pipe")
 
 
-def read_bounded(path: PathLike, limit: int = LIMIT) -> bytes:
+def read_bounded(path: PathLike, limit: int = LIMIT, magic: bytes = b"") -> bytes:
     """Return the content of a file, unless it is larger than the limit.
 
     Args:
         path: The file.
         limit: In bytes.
+        magic: How the file should begin: of another one no more than that is read.
 
     Raises:
         ReadError: If the file is not there, cannot be read or is too large.
@@ -49,10 +50,13 @@ def read_bounded(path: PathLike, limit: int = LIMIT) -> bytes:
     try:
         check_stream(path)
         with Path(path).open("rb") as file:
-            content = file.read(limit + 1)
+            size = os.fstat(file.fileno()).st_size  # 0 of a pipe
+            content = file.read(len(magic))
+            if content == magic and size <= limit:
+                content += file.read(limit + 1 - len(magic))
     except (OSError, ValueError) as error:
         raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
-    if len(content) > limit:
+    if content.startswith(magic) and max(len(content), size) > limit:
         raise ReadError(f"{name}: is larger than {limit} bytes, too large to be read")
     return content
 

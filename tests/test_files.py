@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 import subprocess
 import sys
+import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+import fuzzytree as ft
 from fuzzytree.errors import ReadError, WriteError
 from fuzzytree.files import (
     check_place,
@@ -18,6 +22,8 @@ from fuzzytree.files import (
     read_bounded,
     write_atomically,
 )
+from fuzzytree.learning.parts import Learner
+from fuzzytree.tactile.presses import read_frames
 
 
 def test_a_file_is_read_whole(tmp_path: Path) -> None:
@@ -32,6 +38,52 @@ def test_a_file_larger_than_the_limit_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ReadError) as caught:
         read_bounded(path, 4)
     assert str(caught.value) == f"{path}: is larger than 4 bytes, too large to be read"
+
+
+def peak_of_reading(read: Callable[[], object]) -> tuple[int, str]:
+    """Return the most bytes that a refused reading holds, and the refusal."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(ReadError) as caught:
+            read()
+        return tracemalloc.get_traced_memory()[1], str(caught.value)
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    ("name", "begin", "size", "fault"),
+    [
+        (
+            "s.state",
+            b"",
+            4,
+            "is no state that `fuzzytree collect` wrote, or is cut short",
+        ),
+        (
+            "s.state",
+            b"ARROW1",
+            20,
+            "is larger than 8589934592 bytes, too large to be read",
+        ),
+        ("a.npz", b"", 1, "is no numpy archive (.npz): File is not a zip file"),
+        ("a.npz", b"PK", 20, "is larger than 1073741824 bytes, too large to be read"),
+        ("m.yaml", b"", 20, "is larger than 268435456 bytes, too large to be read"),
+    ],
+)
+def test_a_huge_file_is_refused_by_its_size_or_its_beginning(
+    tmp_path: Path, name: str, begin: bytes, size: int, fault: str
+) -> None:
+    read = {"s": Learner.load, "a": read_frames, "m": ft.load}[name[0]]
+    path = tmp_path / name
+    with path.open("wb") as file:
+        file.write(begin)
+        file.truncate(size * 2**30)  # a hole, which takes no place on the disk
+    with contextlib.suppress(ReadError):
+        read(tmp_path / f"absent{path.suffix}")  # so that what it imports is there
+    peak, text = peak_of_reading(lambda: read(path))
+    assert text == f"{path}: {fault}"
+    assert peak < 2**20
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from fuzzytree.errors import ReadError
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning import (
     COUNTS_MAGIC,
+    STATE_BEGIN,
     STATE_LIMIT,
     StateHeader,
     open_state,
@@ -231,7 +232,8 @@ class LeafCounts:
                 another tree.
         """
         try:
-            header, arrays = open_state(read_bounded(path, STATE_LIMIT), COUNTS_MAGIC)
+            content = read_bounded(path, STATE_LIMIT, STATE_BEGIN)
+            header, arrays = open_state(content, COUNTS_MAGIC)
             result = cls(model, header.target)
             _refuse_another(header.model, result.tree)
             result._take(header, arrays)

@@ -7,6 +7,7 @@ from .learner import ArrayLearner as ArrayLearner
 from .learner import Learnt as Learnt
 from .learner import learn_arrays as learn_arrays
 from .parts import COUNTS_MAGIC as COUNTS_MAGIC
+from .parts import STATE_BEGIN as STATE_BEGIN
 from .parts import STATE_LIMIT as STATE_LIMIT
 from .parts import Learner as Learner
 from .parts import StateHeader as StateHeader

@@ -63,6 +63,9 @@ _LARGE: Final = 1 << 24
 STATE_LIMIT: Final = 1 << 33
 """The largest file of a state that is read, in bytes."""
 
+STATE_BEGIN: Final = b"ARROW1"
+"""How the file of a state begins."""
+
 _WRITERS: Final = {
     MAGIC: "`fuzzytree collect`",
     COUNTS_MAGIC: "`fuzzytree collect --for`",
@@ -386,7 +389,7 @@ class Learner:
         Raises:
             ReadError: If the file is none, is broken, or is of another version.
         """
-        content = read_bounded(path, STATE_LIMIT)
+        content = read_bounded(path, STATE_LIMIT, STATE_BEGIN)
         return cls.from_bytes(
             content, os.fspath(path), units=units, name=name, settings=settings
         )

@@ -103,7 +103,7 @@ def _plain(sensor: Sensor) -> Board:
 def _read_archive(path: PathLike, label: str) -> Recording:
     """Return the frames of an archive, whose classes are in the array of that name."""
     name = os.fspath(path)
-    arrays = _arrays(read_bounded(path, LIMIT), name, label)
+    arrays = _arrays(read_bounded(path, LIMIT, b"PK"), name, label)
     frames = arrays.get("frames")
     if frames is None:
         raise ReadError(f"{name}: has no array 'frames'")
