@@ -6,8 +6,9 @@ folder or a pattern of such files (`rows/*.csv`), or a place that pyarrow opens
 (`s3://place/rows.parquet`); files may be compressed by gzip or zstd, or be of Excel.
 Nothing is guessed: columns are found by their names, a number has a decimal point and
 no thousands separators unless a `TableFormat` says so. To learn from, a column holds
-numbers, truth values, dates or texts, which its whole decides; a column of several
-kinds is an error that says where one stands. `fuzzytree.columns` says more.
+numbers, truth values, dates or texts, which its type decides, or all its cells where it
+has none; a column of several kinds is an error that says where one stands.
+`fuzzytree.columns` says more.
 """
 
 from __future__ import annotations
