@@ -118,13 +118,10 @@ def audit_lines(
         states = [f"{n} {word}" for word, n in known_as(audit.answers).items() if n]
         count = counted(len(audit.answers), "question")
         yield f"{count}: {', '.join(states) or 'none'}"
-        missed = [
-            text
-            for text in audit.unasked
-            if "left out by the user" not in text and ": not asked" not in text
-        ]
+        aside = ("left out by the user", ": not asked")
+        missed = sum(not any(one in text for one in aside) for text in audit.unasked)
         if missed:
-            yield f"not examined, or not to the end: {counted(len(missed), 'code')}"
+            yield f"not examined, or not to the end: {counted(missed, 'code')}"
         yield (
             f"--verbose lists the evidence of each finding and the "
             f"{counted(len(audit.limits), 'limit')} of this audit"

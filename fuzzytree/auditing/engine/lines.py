@@ -88,12 +88,6 @@ class Lines(NamedTuple):
             if low < high:
                 yield x, low, high
 
-    def crossings(self, level: Fraction) -> Iterator[Fraction]:
-        """Yield the places strictly within lines where they have a value."""
-        for a, b, p, q in self.pieces():
-            if (p < level < q) or (q < level < p):
-                yield a + (b - a) * (level - p) / (q - p)
-
     def lowered(self, by: Fraction) -> Lines:
         """Return the same, lower by a number."""
         return self._each(lambda value: value - by)

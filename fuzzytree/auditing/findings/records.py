@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import json
 from collections.abc import Collection, Mapping, Sequence
@@ -12,7 +11,8 @@ import msgspec
 
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Span, State
-from fuzzytree.auditing.recheck.checks import is_unconfirmed
+from fuzzytree.auditing.recheck import checks
+from fuzzytree.auditing.recheck.checks import LIMITS as LIMITS
 from fuzzytree.model import Value, summary
 
 FORMAT: Final = "fuzzytree-audit/1"
@@ -242,7 +242,7 @@ class Audit(Value, frozen=True):
     @property
     def unconfirmed(self) -> int:
         """How many findings could be PROVED, and were not decided again."""
-        return sum(map(is_unconfirmed, self.open_findings))
+        return sum(map(checks.is_unconfirmed, self.open_findings))
 
     def __repr__(self) -> str:
         """Show how many answers there are, and how many of them are findings."""
@@ -265,30 +265,6 @@ class Audit(Value, frozen=True):
         return any(text.endswith(INTERRUPTED) for text in self.unasked)
 
 
-LIMITS: Final = (
-    "that the rules are right: an audit finds what a rule base says, not whether it is "
-    "true of the world",
-    "anything outside the domain: every answer holds on the stated ranges and nowhere "
-    "else",
-    "that all of the domain can happen: inputs are combined in every way, also in "
-    "those that no row will ever have",
-    "more about a sampled share than its interval says, and that only with the stated "
-    "confidence",
-    "what a bracket leaves open: the number lies between the two ends, and nothing "
-    "more is known",
-    "anything about what was declined or not run; both are listed",
-    "that strengths which only touch are reported: ties and gaps without an interior "
-    "are left out",
-    "what rounding changes: answers are about real numbers at the doubles of the "
-    "model, and a runtime may differ where strengths nearly tie",
-    "that other files, runtimes or devices answer alike: only what was compared is "
-    "compared",
-    "that the given rows are right, or stand for those to come",
-    "who made this audit: the digest shows an edit, and is no signature",
-)
-"""Each finishes the sentence "This audit does not establish ..."."""
-
-
 def digest_of(audit: Audit) -> str:
     """Return the SHA-256 of an audit's canonical JSON, as 64 hexadecimal digits.
 
@@ -296,7 +272,4 @@ def digest_of(audit: Audit) -> str:
     empty digest: `json.dumps(facts, sort_keys=True, separators=(",", ":"),
     ensure_ascii=False)` of what the file holds, as UTF-8.
     """
-    facts = json.loads(msgspec.json.encode(audit))
-    facts["digest"] = ""
-    text = json.dumps(facts, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return checks.digest_of(json.loads(msgspec.json.encode(audit)))

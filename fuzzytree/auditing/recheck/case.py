@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property
 
@@ -44,8 +44,6 @@ STEPS = (8, 32)
 MOST_POINTS = 200
 CLOSE = Fraction(1, 2**70)
 """How far beside a point curves that are no lines are evaluated, where many are."""
-
-Extra = Mapping[Proposition, Proposition]
 
 
 class Case:
