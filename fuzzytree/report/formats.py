@@ -69,7 +69,7 @@ def overview_lines(
         runs, extra = ", ".join(run.runs), _extra(run.extra, missing)
         rows.append((run.name, runs, run.dtype, promise_of(run), extra))
     yield from aligned(rows)
-    yield "of systems with exp, powers and the like: within a derived bound"
+    yield "systems with exp, powers and the like agree within a derived bound"
     yield "cannot:"
     yield from _limits((one.name, one.cannot) for one in runtimes)
 
