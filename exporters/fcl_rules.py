@@ -16,7 +16,6 @@ from fuzzytree.formats import (
     JFUZZYLOGIC_PAIRS,
     PAIRS,
     fuzzylite_losses,
-    jfuzzylogic_losses,
 )
 from fuzzytree.model import (
     And,
@@ -201,8 +200,6 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
             yield Loss(where, "NaN where no rule fires: engines keep the value before")
         if words.name == "fuzzylite":
             yield from fuzzylite_losses(output)
-        elif words.name == "jfuzzylogic":
-            yield from jfuzzylogic_losses(output.name, output.defuzzifier)
         yield from _accu_losses(output, system, words)
     if has_accu(words):
         yield from number_losses(system)

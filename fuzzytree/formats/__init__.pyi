@@ -5,7 +5,6 @@ from .fcl.fcl_dialects import FCL_TNORMS as FCL_TNORMS
 from .fcl.fcl_dialects import JFUZZYLOGIC_PAIRS as JFUZZYLOGIC_PAIRS
 from .fcl.fcl_dialects import MARK as MARK
 from .fcl.fcl_dialects import PAIRS as PAIRS
-from .fcl.fcl_dialects import jfuzzylogic_losses as jfuzzylogic_losses
 from .fcl.fcl_reader import FACTS as FACTS
 from .fcl.fcl_reader import read_fcl as read_fcl
 from .fcl.fcl_rules import ALWAYS as ALWAYS

@@ -390,8 +390,8 @@ def test_where_engines_read_a_rule_otherwise_only_a_named_one_is_no_loss(
     assert infer(reading.model, row).outputs == pytest.approx((answer,))
     what = (
         "a OR b AND c is read as a OR (b AND c), as in the standard; jFuzzyLogic reads "
-        "(a OR b) AND c; write parentheses, or read it as fcl:iec or fcl:jfuzzylogic "
-        "to choose"
+        "(a OR b) AND c; write parentheses, or pass --from fcl:iec or --from "
+        "fcl:jfuzzylogic"
     )
     assert reading.losses == (() if dialect else (Loss("line 10", what),))
 
@@ -441,15 +441,15 @@ def test_operators_that_are_no_partners_are_a_loss_where_no_engine_is_named() ->
     assert _read(text).losses[-1] == Loss(
         "line 8",
         "AND and OR are no partners: both are taken, and jFuzzyLogic takes the last "
-        "one and its partner; read it as fcl:iec or fcl:jfuzzylogic to choose",
+        "one and its partner; pass --from fcl:iec or --from fcl:jfuzzylogic",
     )
 
 
 def test_a_missing_accu_is_a_loss_where_no_engine_is_named() -> None:
     text = PYIT2FLS.replace("    ACCU : MAX;\n", "")
     what = (
-        "ACCU is missing: MAX is taken, and jFuzzyLogic takes SUM; read it as fcl:iec "
-        "or fcl:jfuzzylogic to choose"
+        "ACCU is missing: MAX is taken, and jFuzzyLogic takes SUM; pass --from fcl:iec "
+        "or --from fcl:jfuzzylogic"
     )
     assert _read(text).losses == (
         Loss("output 'fan'", what),
@@ -464,13 +464,12 @@ def test_a_missing_accu_is_a_loss_where_no_engine_is_named() -> None:
     assert reading.remarks[0] == "the dialect is jFuzzyLogic: as it is asked for"
 
 
-def test_a_coa_that_jfuzzylogic_computes_otherwise_is_a_loss() -> None:
+def test_a_coa_of_jfuzzylogic_that_is_another_one_is_a_remark() -> None:
     text = JFUZZYLOGIC.replace("METHOD : COG;", "METHOD : COA;")
-    assert _read(text).losses[-1] == Loss(
-        "output 'tip'",
-        "COA is the mean of the samples that part the area most evenly; jFuzzyLogic "
-        "adds from both ends, without the first and the last sample",
-    )
+    assert (
+        "output 'tip': 1000 values of its range are looked at (low ends); its COA adds "
+        "areas from both ends, and can end at another value"
+    ) in _read(text).remarks
 
 
 def test_a_file_of_pyit2fls_is_read_with_its_hundred_values() -> None:

@@ -329,8 +329,8 @@ def test_two_rules_of_one_term_are_joined_as_in_the_named_engine_or_a_loss(
     }[aggregation]
     loss = Loss(
         "output 'y'",
-        f"rules that conclude the same term ('up') are {what}; read it as "
-        "fll:fuzzylite or fll:pyfuzzylite to choose",
+        f"rules that conclude the same term ('up') are {what}; pass --from "
+        "fll:fuzzylite or --from fll:pyfuzzylite",
     )
     assert reading.losses == (() if dialect else (loss,))
 

@@ -10,8 +10,8 @@ from lark import Token
 
 from fuzzytree.formats.fcl.fcl_syntax import (
     FclBlock,
+    FclChain,
     FclCondition,
-    FclJunction,
     FclNegation,
     FclProposition,
     FclRange,
@@ -32,7 +32,7 @@ from fuzzytree.formats.words import (
     Words,
     meanings,
 )
-from fuzzytree.model import Defuzzifier, Loss, SNorm, TNorm, name_choice
+from fuzzytree.model import Defuzzifier, SNorm, TNorm, name_choice
 
 _Norm = TypeVar("_Norm")
 
@@ -80,7 +80,7 @@ PAIRS: Mapping[TNorm, SNorm] = {
 """The OR that an AND brings with it."""
 
 JFUZZYLOGIC_PAIRS: Mapping[TNorm, SNorm] = {**PAIRS, "hamacher product": "einstein sum"}
-CHOICE: Final = "read it as fcl:iec or fcl:jfuzzylogic to choose"
+CHOICE: Final = "pass --from fcl:iec or --from fcl:jfuzzylogic"
 """What to do where the engines differ and a file does not say which one is meant."""
 
 _OF_JFUZZYLOGIC = frozenset(
@@ -104,35 +104,33 @@ class DialectEvidence(NamedTuple):
     weight: int = 2
 
 
-class Detection(NamedTuple):
-    """The dialect of a file, why it is, and whether only its engine reads the file."""
+def detected(text: FclText, wanted: Dialect | None) -> tuple[Dialect, str, bool]:
+    """Return the dialect of a file, why it is, and whether no other one can be meant.
 
-    dialect: Dialect
-    sentence: str
-    is_certain: bool
-
-
-def detected(text: FclText, wanted: Dialect | None) -> Detection:
-    """Return the dialect of a file: the wanted one, or what its words speak for."""
+    It is the wanted one, or the one that the words of the file speak for.
+    """
     named = wanted or _first_line(text.text)
     if named is not None:
         why = "as it is asked for" if wanted else "the first line says so"
-        return Detection(named, f"the dialect is {SHOWN[named]}: {why}", True)
+        return named, f"the dialect is {SHOWN[named]}: {why}", True
     result = list(_evidence(text))
     counts: Counter[Dialect] = Counter()
     for one in {(one.dialect, one.what): one for one in result}.values():
         counts[one.dialect] += one.weight
     best: Dialect = max(_ORDER, key=lambda one: (counts[one], -_ORDER.index(one)))
     if not counts[best]:
-        sentence = "the dialect is IEC 61131-7: nothing speaks for another one"
-        return Detection("iec", sentence, False)
+        return (
+            "iec",
+            "the dialect is IEC 61131-7: nothing speaks for another one",
+            False,
+        )
     sentence = f"the dialect is {SHOWN[best]}: {_listed(result, best)}"
     for other in _ORDER:
         if other == best or not counts[other]:
             continue
         sentence += f"; {SHOWN[other]} would have {_listed(result, other)}"
     is_certain = best in ("fuzzylite", "jfuzzylogic") and counts[best] > 1
-    return Detection(best, sentence, is_certain)
+    return best, sentence, is_certain
 
 
 def is_marked(text: str) -> bool:
@@ -253,7 +251,7 @@ def propositions(condition: FclCondition) -> Iterator[FclProposition]:
             yield condition
         case FclNegation(part=part):
             yield from propositions(part)
-        case FclJunction(parts=parts):
+        case FclChain(parts=parts):
             for part in parts:
                 yield from propositions(part)
 
@@ -269,18 +267,3 @@ def norm_of(
             notes.mistake(place(word), sentence)
         return words.get(word.upper())
     return None
-
-
-def jfuzzylogic_losses(name: str, how: Defuzzifier) -> Iterator[Loss]:
-    """Yield where jFuzzyLogic finds another number for an output of its own dialect.
-
-    Example:
-        >>> [one.where for one in jfuzzylogic_losses("tip", Defuzzifier("bisector"))]
-        ["output 'tip'"]
-    """
-    if how.method == "bisector":
-        what = (
-            "COA is the mean of the samples that part the area most evenly; "
-            "jFuzzyLogic adds from both ends, without the first and the last sample"
-        )
-        yield Loss(f"output {name!r}", what)

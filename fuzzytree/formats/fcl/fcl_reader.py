@@ -23,11 +23,9 @@ from fuzzytree.formats.fcl.fcl_dialects import (
     DEFUZZIFIERS,
     FCL_METHODS,
     FCL_SNORMS,
-    Detection,
     Dialect,
     detected,
     is_marked,
-    jfuzzylogic_losses,
     norm_of,
 )
 from fuzzytree.formats.fcl.fcl_rules import (
@@ -107,18 +105,16 @@ def read_fcl(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     """
     text = parsed(content, name)
     notes = ReaderNotes(list(text.mistakes), remarks=list(text.remarks))
-    detection = detected(text, dialect)
-    notes.remark(detection.sentence)
+    dialect, sentence, is_certain = detected(text, dialect)
+    notes.remark(sentence)
     title, blocks = blocks_of(text, notes)
-    known = known_variables(blocks, detection, notes)
+    known = known_variables(blocks, dialect, notes, is_certain=is_certain)
     inputs = tuple(read_input(one, known) for one in known.inputs)
     outputs = tuple(read_output(one, known) for one in known.outputs)
     labels = {one.name: [label.name for label in one.terms] for one in inputs}
     labels |= {one.name: [label.name for label in one.terms] for one in outputs}
     curved = {one.name for one in outputs if not one.defuzzifier.is_weighted}
-    scope = Scope(
-        labels, set(known.outputs), curved, known.dialect, notes, known.is_certain
-    )
+    scope = Scope(labels, set(known.outputs), curved, dialect, notes, is_certain)
     read_blocks = _rule_blocks(blocks, scope)
     outputs = tuple(_aggregated(one, known, read_blocks) for one in outputs)
     if not outputs and not notes.mistakes:
@@ -245,10 +241,14 @@ class FclVariables(msgspec.Struct, frozen=True):
 
 
 def known_variables(
-    blocks: Sequence[FclBlock], detection: Detection, notes: ReaderNotes
+    blocks: Sequence[FclBlock],
+    dialect: Dialect,
+    notes: ReaderNotes,
+    *,
+    is_certain: bool,
 ) -> FclVariables:
     """Return the variables of a file; mistakes are noted."""
-    known = FclVariables({}, {}, detection.dialect, notes, detection.is_certain)
+    known = FclVariables({}, {}, dialect, notes, is_certain)
     for kind, variables in (("VAR_INPUT", known.inputs), ("VAR_OUTPUT", known.outputs)):
         for block in blocks:
             if block.kind == kind:
@@ -452,9 +452,9 @@ def _defuzzifier(name: str, block: FclBlock, known: FclVariables) -> Defuzzifier
     )
     if not known.is_certain:
         text += "; jFuzzyLogic takes 1000 (low ends), and fuzzylite 100 (middle)"
+    elif known.dialect == "jfuzzylogic" and method == "bisector":
+        text += "; its COA adds areas from both ends, and can end at another value"
     known.notes.remark(text)
-    if known.dialect == "jfuzzylogic":
-        known.notes.losses.extend(jfuzzylogic_losses(name, result))
     return result
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 import msgspec
@@ -21,8 +21,8 @@ from fuzzytree.formats.fcl.fcl_dialects import (
 from fuzzytree.formats.fcl.fcl_syntax import (
     Connective,
     FclBlock,
+    FclChain,
     FclCondition,
-    FclJunction,
     FclNegation,
     FclProposition,
     RuleStatement,
@@ -46,6 +46,7 @@ from fuzzytree.model import (
     SNorm,
     SystemRule,
     TNorm,
+    combined,
     joints,
     name_choice,
     questions,
@@ -97,35 +98,29 @@ def _condition(condition: FclCondition, scope: Scope) -> Condition:
             return _proposition(condition, scope)
         case FclNegation(part=part):
             return Not(_condition(part, scope))
-        case FclJunction(connective=connective, parts=parts):
+        case FclChain(words=words):
+            parts = [_condition(part, scope) for part in condition.parts]
             if scope.dialect == "jfuzzylogic":
-                return _from_the_left(condition, scope)
-            result = tuple(_condition(part, scope) for part in parts)
-            return And(result) if connective == "and" else Or(result)
+                return _from_the_left(parts, words)
+            groups: list[list[Condition]] = [[]]
+            for word, inner in zip(("and", *words), parts, strict=True):
+                if word == "or":
+                    groups.append([])
+                groups[-1].append(inner)
+            return combined(Or, (combined(And, group) for group in groups))
 
 
-def _from_the_left(junction: FclJunction, scope: Scope) -> Condition:
-    """Return a condition as jFuzzyLogic reads it: AND and OR bind alike."""
-    (_, first), *others = _flat(junction, junction.connective)
-    result, last = _condition(first, scope), ""
-    for connective, part in others:
-        joint = And if connective == "and" else Or
-        same = isinstance(result, And | Or) and connective == last
-        parts = result.parts if same and isinstance(result, And | Or) else (result,)
-        result, last = joint((*parts, _condition(part, scope))), connective
-    return result
-
-
-def _flat(
-    junction: FclJunction, before: Connective
-) -> Iterator[tuple[Connective, FclCondition]]:
-    """Yield what parentheses hold together, and the word before each."""
-    for part in junction.parts:
-        if isinstance(part, FclJunction) and not part.is_grouped:
-            yield from _flat(part, before)
-        else:
-            yield before, part
-        before = junction.connective
+def _from_the_left(
+    parts: Sequence[Condition], words: Sequence[Connective]
+) -> Condition:
+    """Return a chain as jFuzzyLogic reads it: AND and OR bind alike."""
+    kinds: dict[Connective, type[And] | type[Or]] = {"and": And, "or": Or}
+    group, last = [parts[0]], words[0]
+    for word, part in zip(words, parts[1:], strict=True):
+        if word != last:
+            group, last = [combined(kinds[last], group)], word
+        group.append(part)
+    return combined(kinds[last], group)
 
 
 def _proposition(proposition: FclProposition, scope: Scope) -> Proposition:
@@ -199,16 +194,9 @@ def _is_ambiguous(condition: FclCondition) -> bool:
             return False
         case FclNegation(part=part):
             return _is_ambiguous(part)
-        case FclJunction(connective=connective, parts=parts):
-            return any(map(_is_ambiguous, parts)) or (
-                connective == "or"
-                and any(
-                    isinstance(part, FclJunction)
-                    and part.connective == "and"
-                    and not part.is_grouped
-                    for part in parts[1:]
-                )
-            )
+        case FclChain(parts=parts, words=words):
+            mixed = "or" in words and "and" in words[words.index("or") :]
+            return mixed or any(map(_is_ambiguous, parts))
 
 
 class FclRuleBlock(msgspec.Struct, frozen=True):
@@ -276,18 +264,16 @@ def _norms(
     pairs = JFUZZYLOGIC_PAIRS if is_jfuzzylogic else PAIRS
     partners = {norm: conjunction for conjunction, norm in pairs.items()}
     if conjunction and disjunction and pairs[conjunction] != disjunction:
-        where, what = f"line {block.line}", "AND and OR are no partners"
         if is_jfuzzylogic:
-            what = f"{what}; the last of the two and its partner count, as there"
-            scope.notes.remark(f"{where}: {what}")
-            last, other = (place(block.words(word)[0]) for word in ("AND", "OR"))
-            if last > other:
+            first, second = (place(block.words(word)[0]) for word in ("AND", "OR"))
+            if first > second:
                 disjunction = pairs[conjunction]
             else:
                 conjunction = partners.get(disjunction, conjunction)
         elif not scope.is_certain:
-            what = f"{what}: both are taken, and jFuzzyLogic takes the last one and its"
-            scope.notes.loss(where, f"{what} partner; {CHOICE}")
+            what = "AND and OR are no partners: both are taken, and jFuzzyLogic takes "
+            what += f"the last one and its partner; {CHOICE}"
+            scope.notes.loss(f"line {block.line}", what)
     if conjunction is None and any(And in joints(rule.when) for rule in rules):
         conjunction = partners.get(disjunction or "maximum", "minimum")
         text = f"line {block.line}: AND is missing; {conjunction} is taken"

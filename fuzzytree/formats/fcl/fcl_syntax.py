@@ -40,21 +40,20 @@ class FclProposition(msgspec.Struct, frozen=True, gc=False):
     words: tuple[Token, ...]
 
 
-class FclJunction(msgspec.Struct, frozen=True):
-    """Conditions that AND or OR joins."""
+class FclChain(msgspec.Struct, frozen=True):
+    """Conditions as they stand, and the word between each two."""
 
-    connective: Connective
-    parts: tuple[FclProposition | FclJunction | FclNegation, ...]
-    is_grouped: bool = False
+    parts: tuple[FclProposition | FclChain | FclNegation, ...]
+    words: tuple[Connective, ...]
 
 
 class FclNegation(msgspec.Struct, frozen=True):
     """NOT in front of a condition."""
 
-    part: FclProposition | FclJunction | FclNegation
+    part: FclProposition | FclChain | FclNegation
 
 
-FclCondition = FclProposition | FclJunction | FclNegation
+FclCondition = FclProposition | FclChain | FclNegation
 
 
 class Header(msgspec.Struct, frozen=True):
@@ -187,18 +186,9 @@ class _Statements(Transformer[Token, Any]):
     def proposition(self, children: list[Token]) -> FclProposition:
         return FclProposition(children[0], children[1], tuple(children[2:]))
 
-    def condition(self, children: list[Any]) -> FclJunction:
-        return FclJunction("or", tuple(one for one in children if not _is_token(one)))
-
-    def both(self, children: list[Any]) -> FclJunction:
-        return FclJunction("and", tuple(one for one in children if not _is_token(one)))
-
-    def part(self, children: list[Any]) -> FclCondition:
-        (inner,) = (one for one in children if not _is_token(one))
-        if isinstance(inner, FclJunction):
-            return FclJunction(inner.connective, inner.parts, is_grouped=True)
-        only: FclCondition = inner
-        return only
+    def condition(self, children: list[Any]) -> FclChain:
+        words = tuple(one.type.lower() for one in children[1::2])
+        return FclChain(tuple(children[::2]), words)
 
     def negation(self, children: list[Any]) -> FclNegation:
         return FclNegation(children[-1])

@@ -139,21 +139,17 @@ def _system(
 def _joined(
     system: FuzzySystem, dialect: Dialect | None, notes: ReaderNotes, *, is_own: bool
 ) -> FuzzySystem:
-    """Return a system whose numbers are joined as in an engine; note where it counts.
-
-    What a file of ours means its writer's page says.
-    """
+    """Return a system whose numbers are joined as in an engine, and note which."""
     outputs = {one.name: one for one in system.outputs}
     for output, what, norm in joined_twice(system):
-        where = f"output {output.name!r}"
         if dialect is not None:
             aggregation = norm if dialect == "pyfuzzylite" else None
             outputs[output.name] = replace(output, aggregation=aggregation)
-        elif is_own:
-            notes.remark(f"{where}: {what}")
+        elif is_own:  # docs/reference/fll.md says what we mean
+            notes.remark(f"output {output.name!r}: {what}")
         else:
-            choice = "read it as fll:fuzzylite or fll:pyfuzzylite to choose"
-            notes.loss(where, f"{what}; {choice}")
+            what += "; pass --from fll:fuzzylite or --from fll:pyfuzzylite"
+            notes.loss(f"output {output.name!r}", what)
     return replace(system, outputs=tuple(outputs.values()))
 
 
