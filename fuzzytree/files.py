@@ -227,9 +227,7 @@ def _nearest_folder(path: PathLike) -> Path:
     Raises:
         WriteError: If a file stands where a folder is needed.
     """
-    target = Path(path)
-    if target.is_symlink():  # the folder that it leads to
-        target = Path(os.path.realpath(path))
+    target = Path(os.path.realpath(path) if Path(path).is_symlink() else path)
     folder = next(folder for folder in target.parents if os.path.lexists(folder))
     if not folder.is_dir():
         raise WriteError(

@@ -1370,8 +1370,7 @@ def _file_pieces(
     except OSError as error:
         raise TableError(f"{path}: cannot be read: {reason(error)}") from error
     first: TablePiece | None = None
-    paths = [Path(file) for file in files]
-    sizes = [path.stat().st_size if path.is_file() else 0 for path in paths]
+    sizes = [Path(f).stat().st_size if Path(f).is_file() else 0 for f in files]
     before, whole = 0, max(sum(sizes), 1)
     for file, size in zip(files, sizes, strict=True):
         title = name if name and len(files) == 1 else file

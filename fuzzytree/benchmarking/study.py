@@ -255,8 +255,7 @@ class _Run:
     def try_foreign(self, candidates: Sequence[Candidate]) -> None:
         """Leave out what ends or blocks a child process.
 
-        The budget does not end the trial of peers, which were asked for, and begins
-        after it: how long their libraries take to load depends on the machine's load.
+        Peers were asked for: the budget begins after their trial, however long it is.
         """
         self.peers = {c.name for c in candidates if c.kind == "peer"}
         todo = [c for c in candidates if c.modules or c.kind == "peer"]
