@@ -163,7 +163,6 @@ def test_the_python_of_a_page_runs(
     if page.stem in ("add-a-format", "frames", "tactile", *ENGINES):
         pytest.skip("a test of its own follows the page")
     (tmp_path / "examples").symlink_to(ROOT / "examples")
-    (tmp_path / "out").mkdir()
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     for code in re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL):

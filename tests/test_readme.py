@@ -97,7 +97,6 @@ def _rewritten_examples(text: str, folder: Path) -> str:
     """Return a page with its examples run again in a folder, in their order."""
     for name in ("benchmarks", "examples"):
         (folder / name).symlink_to(ROOT / name)
-    (folder / "out").mkdir()
     pieces: list[str] = []
     end = 0
     output: str | None = None
