@@ -67,7 +67,7 @@ def typed_rows(labels: list[object]) -> pd.DataFrame:
     classes = [labels[k % len(labels)] for k in numbers.tolist()]
     tenth = decimal.Decimal("0.1")
     table = {
-        "whole": pa.array((numbers * 7) % 31 + numbers % len(labels) * 2**53),
+        "whole": pa.array((numbers * 7) % 31 + numbers % len(labels) * 2**50),
         "flag": pa.array([None if k % 50 == 9 else k % 3 == 0 for k in numbers]),
         "price": pa.array([tenth * (k % 40) for k in numbers.tolist()]),
         "single": pa.array(((numbers * 11) % 17 / 3).astype(np.float32)),

@@ -87,7 +87,7 @@ def rows_of(count: int = 2_000, labels: tuple[object, ...] = ("a", "b", "c")) ->
     tenth = decimal.Decimal("0.1")
     columns: list[Any] = [
         pa.array(normal[0] * 1e-9),
-        pa.array(whole + 2**53 * codes),
+        pa.array(whole + 2**50 * codes),
         pa.array(whole, mask=codes == 9),
         pa.array([tenth * int(n) if n % 17 else None for n in whole]),
         pa.array(normal[4].astype(np.float32)),
