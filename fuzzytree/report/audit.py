@@ -425,4 +425,4 @@ def code_lines(codes: Sequence[Code], *, is_whole: bool = True) -> Iterator[str]
     yield from aligned([*rows, *((c.code, c.severity, c.title) for c in shown)])
     if len(shown) < len(codes):
         count = counted(len(declined), "code")
-        yield f"FTD..  {count} of declined questions: `fuzzytree explain FTD`"
+        yield f"FTD..  {count} for what was not decided: `fuzzytree explain FTD`"
