@@ -32,6 +32,7 @@ SAME = {
     "--set": "an option of a writer, by its name",
     "--skip": "what to leave out of all there is",
     "--target": "the column of the classes",
+    "--terms": "the kind of rules of a tree: those that equal it, or the paper's",
     "--to": "the format to write",
     "--unit": "a unit; `learn` takes several, by column",
 }
