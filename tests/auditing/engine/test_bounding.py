@@ -41,7 +41,12 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
-from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule
+from tests.auditing.engine.bases import (
+    cpu_clock,
+    random_base,
+    unit_domain,
+    with_hidden_rule,
+)
 
 CONJUNCTIONS: tuple[Conjunction, ...] = ("minimum", "product")
 
@@ -87,7 +92,9 @@ def test_every_witness_holds_and_no_sampled_row_contradicts_a_proof(
         answers = [exact_answer(rules, row).strengths for row in _rows(rules, 25)]
         for rule in range(1, 6):
             rivals = _rivals(rules, rule)
-            state = wins_by_boxes(rules, unit_domain(rules), rule, rivals, Clock(5.0))
+            state = wins_by_boxes(
+                rules, unit_domain(rules), rule, rivals, cpu_clock(5.0)
+            )
             states.add(type(state))
             if isinstance(state, Witness):
                 strengths = _strengths(rules, state.point)
@@ -106,7 +113,7 @@ def _check_against_cells(rules: RuleBase) -> None:
     given = arrange(rules, box)
     for rule in range(1, 6):
         rivals = _rivals(rules, rule)
-        one = wins_by_boxes(rules, box, rule, rivals, Clock(5.0))
+        one = wins_by_boxes(rules, box, rule, rivals, cpu_clock(5.0))
         other = wins(given, rule, rivals)
         # Where rules tie at irrational levels, cells alone cannot tell.
         if not isinstance(other, Bracket):
@@ -190,7 +197,9 @@ def test_rules_of_a_tree_that_share_propositions_are_decided(
         rules = rules_from_tree(random_tree(seed, leaves=6), conjunction=conjunction)
         box = Domain(tuple(DomainSide(name, -9.0, 9.0) for name in rules.inputs))
         for rule in range(1, 7):
-            state = wins_by_boxes(rules, box, rule, _rivals(rules, rule), Clock(5.0))
+            state = wins_by_boxes(
+                rules, box, rule, _rivals(rules, rule), cpu_clock(5.0)
+            )
             assert isinstance(state, Witness | Proved)
 
 
@@ -199,7 +208,7 @@ def test_the_largest_lead_is_between_its_bounds(conjunction: Conjunction) -> Non
     for rules in itertools.islice(_small_bases(conjunction), 1):
         rivals = _rivals(rules, 2)
         found = largest_lead_by_boxes(
-            rules, unit_domain(rules), 2, rivals, Clock(5.0), tolerance=1e-2
+            rules, unit_domain(rules), 2, rivals, cpu_clock(5.0), tolerance=1e-2
         )
         assert 0.0 <= found.low <= found.high <= found.low + 1.1e-2
         strengths = _strengths(rules, found.point)
@@ -214,7 +223,9 @@ def test_the_largest_lead_is_between_its_bounds(conjunction: Conjunction) -> Non
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
 def test_the_least_cover_is_below_every_sampled_one(conjunction: Conjunction) -> None:
     rules = random_base(1, 6, 2, conjunction, "lr")
-    found = least_cover_by_boxes(rules, unit_domain(rules), Clock(5.0), tolerance=1e-4)
+    found = least_cover_by_boxes(
+        rules, unit_domain(rules), cpu_clock(5.0), tolerance=1e-4
+    )
     assert found.high - found.low <= 1e-4
     assert found.low <= max(_strengths(rules, found.point)) <= found.high
     for row in _rows(rules, 100):
@@ -318,7 +329,7 @@ def test_larger_bases_are_decided_without_contradiction(seed: int) -> None:
     answers = [exact_answer(rules, row).strengths for row in _rows(rules, 300)]
     for rule in range(1, 8):
         rivals = _rivals(rules, rule)
-        state = wins_by_boxes(rules, unit_domain(rules), rule, rivals, Clock(2.0))
+        state = wins_by_boxes(rules, unit_domain(rules), rule, rivals, cpu_clock(2.0))
         leads = [one[rule - 1] - max(one[n - 1] for n in rivals) for one in answers]
         if isinstance(state, Witness):
             strengths = _strengths(rules, state.point)
@@ -335,7 +346,9 @@ def test_a_rule_hidden_by_two_others_in_four_inputs_is_proved_or_found() -> None
     for level, expected in ((0.7, Proved), (0.7 - 1e-6, Witness)):
         planted = with_hidden_rule(rules, level)
         rivals = _rivals(planted, 10)
-        state = wins_by_boxes(planted, unit_domain(planted), 10, rivals, Clock(20.0))
+        state = wins_by_boxes(
+            planted, unit_domain(planted), 10, rivals, cpu_clock(20.0)
+        )
         assert type(state) is expected
 
 
@@ -355,8 +368,8 @@ def test_rules_of_a_hundred_inputs_are_decided_too(
         Semantics(conjunction),
     )
     box = unit_domain(rules)
-    assert isinstance(wins_by_boxes(rules, box, 1, {2}, Clock(1.0)), Proved)
-    assert isinstance(wins_by_boxes(rules, box, 2, {1}, Clock(1.0)), Witness)
+    assert isinstance(wins_by_boxes(rules, box, 1, {2}, cpu_clock(1.0)), Proved)
+    assert isinstance(wins_by_boxes(rules, box, 2, {1}, cpu_clock(1.0)), Witness)
 
 
 def test_a_step_at_the_lower_end_of_many_inputs_is_a_bracket() -> None:

@@ -56,7 +56,7 @@ def test_a_rule_is_nowhere_weaker_iff_the_other_never_wins(
     rules = random_base(seed, 5, 2, kind=kind, shared=0.5, odd=0.2)
     both = compared(rules)
     for strong, weak in itertools.permutations(range(1, 6), 2):
-        state = wins(both.base, weak, {strong}, Clock(20.0))
+        state = wins(both.base, weak, {strong}, Clock())
         verdict = both.never_weaker(strong, weak)
         if not isinstance(state, Bracket) and verdict != "open":
             assert (verdict == "always") is isinstance(state, Proved)

@@ -7,11 +7,10 @@ import pytest
 
 from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
 from fuzzytree.auditing.engine.bounding import wins_by_boxes
-from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.questions import wins
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.numerics.oracle import DECIDED, decide
-from tests.auditing.engine.bases import random_base, unit_domain
+from tests.auditing.engine.bases import cpu_clock, random_base, unit_domain
 
 CASES = [
     ("lr", 5, 3, 0.0, 0.0, 0),
@@ -48,8 +47,10 @@ def test_cells_boxes_and_rows_never_contradict_each_other(
         for rule in range(1, rules + 1):
             label = base.rules[rule - 1].then
             rivals = [n for n, r in enumerate(base.rules, 1) if r.then != label]
-            found = wins(given, rule, rivals, Clock(3.0))
-            other = wins_by_boxes(base, box, rule, rivals, Clock(0.3), tolerance=1e-6)
+            found = wins(given, rule, rivals, cpu_clock(3.0))
+            other = wins_by_boxes(
+                base, box, rule, rivals, cpu_clock(0.3), tolerance=1e-6
+            )
             asked += 1
             won = (answers.rule == rule) & (answers.status == DECIDED)
             if isinstance(found, Proved):

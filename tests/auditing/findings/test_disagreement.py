@@ -29,6 +29,7 @@ from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import Conjunction
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.testing import random_tree
+from tests.auditing.engine.bases import cpu_clock
 from tests.auditing.findings.small_trees import one_cut, subject_of, two_cuts
 
 
@@ -158,7 +159,7 @@ def _sampled(seed: int, points: int) -> None:
         reach[name] = 3.0 * max(cuts, default=1.0)
     limits = {name: (-r, r) for name, r in reach.items()}
     rows = [[draw.uniform(-r, r) for r in reach.values()] for _ in range(3)]
-    subject = subject_of(tree, limits=limits, rows=rows, clock=Clock(20.0))
+    subject = subject_of(tree, limits=limits, rows=rows, clock=cpu_clock(20.0))
     results = [*answers(subject)]
     differing = {one.rules[0] for one in results if one.is_finding}
     assert subject.raw is not None

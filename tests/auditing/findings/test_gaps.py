@@ -44,7 +44,7 @@ def _asked(
         policy=policy,
         domain=box,
         settings=AuditSettings(),
-        clock=Clock(30.0),
+        clock=Clock(),
         rows=rows,
         is_whole=is_whole,
     )

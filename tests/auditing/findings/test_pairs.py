@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from fractions import Fraction
 
 import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.arrangement import prediction_at
+from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -79,7 +81,7 @@ def base(
 def answers_for(
     rules: RuleBase, code: str, settings: AuditSettings | None = None
 ) -> list[AuditAnswer]:
-    settings = settings or AuditSettings(budget_s=5.0)
+    settings = settings or AuditSettings(budget_s=600.0)
     return [
         *audit(
             Material(rules), settings=settings, selection=AuditSelection(select=[code])
@@ -546,9 +548,10 @@ def test_many_propositions_that_matter_are_reported_up_to_a_number_and_counted(
 
 def test_what_a_spent_budget_leaves_open_is_a_bracket_or_cut_short() -> None:
     rules = random_base(2, 4, 2, kind="points", odd=0.2, combinations=1)
+    moments = itertools.count()
     made = audit(
         Material(rules),
-        settings=AuditSettings(budget_s=0.02),
+        clock=Clock(1.0, now=lambda: next(moments) / 20.0),
         selection=AuditSelection(select=["FT107"]),
     )
     states = {type(one.state) for one in made.answers}
