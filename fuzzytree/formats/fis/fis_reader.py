@@ -100,7 +100,7 @@ def read_fis(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     if notes.mistakes or parts is None:
         raise report(name, notes.mistakes)
     system, positions = parts
-    model, facts = as_written(system, page.comments)
+    model, facts = as_written(system, page.comments, by_input=True)
     return notes.reading(model, locating(positions, facts), f"fis:{dialect}")
 
 

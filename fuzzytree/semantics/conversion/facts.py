@@ -37,6 +37,7 @@ from fuzzytree.model import (
     Variable,
     questions,
 )
+from fuzzytree.semantics.conversion.joint_terms import with_joint_terms
 from fuzzytree.semantics.conversion.points import band_of, shape_of, stepped
 from fuzzytree.semantics.conversion.scores import Always, Scores, as_system, flattened
 
@@ -46,6 +47,7 @@ FACTS: Final = "rules of fuzzytree: "
 """What a comment with facts begins with, in formats whose comments are text."""
 
 _MOST = 4 * 2**20  # bytes of facts
+_MOST_JOINT = 64  # propositions that a joint term stands for, in the mean
 
 
 class _Named(Value, frozen=True):
@@ -156,7 +158,9 @@ def facts_of(
     return text.replace("--", "-\\u002d")
 
 
-def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
+def as_rules(
+    system: FuzzySystem, facts: str | None = None, *, by_input: bool = False
+) -> RuleBase | None:
     """Return the rule base that a system stands for, or None.
 
     The names of the system may be others than those of the facts: what belongs
@@ -167,6 +171,8 @@ def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
         system: A system, such as one that was read.
         facts: The line that `facts_of` made; None recognises systems of the form
             `winner`, with the defaults for what a system does not say.
+        by_input: Whether each rule has one term for each input, in the order of the
+            inputs, so that a joint term stands for several propositions.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -184,7 +190,7 @@ def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
         result = _decoded(facts)
     except (msgspec.DecodeError, UnicodeEncodeError, RecursionError):
         return None
-    if result is None or not _may_fit(system, result):
+    if result is None or not _may_fit(system, result, by_input=by_input):
         return None
     places = _places(result)
     curves = _shapes(system, [len(result.variables[place].terms) for place in places])
@@ -193,6 +199,8 @@ def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
     try:
         rules = _rules(result, dict(zip(places, curves, strict=True)))
         expected, _ = flattened(as_system(rules, result.scores, always=result.always))
+        if by_input:
+            expected = with_joint_terms(expected)
     except (FuzzyTreeError, IndexError, ValueError):
         return None
     is_winner = result.scores == "winner"
@@ -224,9 +232,14 @@ def _with_bands(rules: RuleBase, facts: _Facts) -> RuleBase:
 
 
 def as_written(
-    system: FuzzySystem, comments: Iterable[str]
+    system: FuzzySystem, comments: Iterable[str], *, by_input: bool = False
 ) -> tuple[RuleBase | FuzzySystem, str | None]:
     """Return the rule base that a file was made of, and its facts, or the system.
+
+    Args:
+        system: What the file says.
+        comments: Its comments.
+        by_input: As in `as_rules`.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -239,7 +252,7 @@ def as_written(
     facts = next(
         (one.removeprefix(FACTS) for one in every if one.startswith(FACTS)), None
     )
-    rules = None if facts is None else as_rules(system, facts)
+    rules = None if facts is None else as_rules(system, facts, by_input=by_input)
     return (system, None) if rules is None else (rules, facts)
 
 
@@ -291,7 +304,7 @@ def _decoded(facts: str) -> _Facts | None:
     return result if result.fuzzytree == 1 else None
 
 
-def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
+def _may_fit(system: FuzzySystem, facts: _Facts, *, by_input: bool) -> bool:
     """Return whether facts are as large as the system, before anything is made of them.
 
     Facts name a proposition by its place, so that few bytes could stand for very much.
@@ -307,7 +320,8 @@ def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
     if len(_places(facts)) != len(system.variables):
         return False
     result = sum(1 for rule in system.rules for _ in questions(rule.when))
-    return needed <= result + 2 * len(facts.rules) + 1
+    room = result + 2 * len(facts.rules) + 1
+    return needed <= room * (_MOST_JOINT if by_input else 1)
 
 
 def _shapes(system: FuzzySystem, counts: Sequence[int]) -> list[list[Term]] | None:

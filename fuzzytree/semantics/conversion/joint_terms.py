@@ -6,19 +6,26 @@ rounding, or their product within a tolerance.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
+
+from msgspec.structs import replace
 
 from fuzzytree import numerics
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
     And,
     Condition,
+    FuzzySystem,
     Not,
     Or,
     Points,
     Proposition,
     RuleBlock,
     Term,
+    combined,
+    questions,
+    unlike,
 )
 from fuzzytree.numerics import Lines
 from fuzzytree.semantics.conversion.points import shape_of
@@ -41,6 +48,47 @@ def operands(condition: Condition, block: RuleBlock) -> list[Condition]:
         is_same = isinstance(part, type(condition))
         parts += operands(part, block) if is_same and is_open else [part]
     return parts
+
+
+def with_joint_terms(system: FuzzySystem) -> FuzzySystem:
+    """Return a system whose rules test each input once, in the order of the inputs.
+
+    Raises:
+        LossError: As `joint_points`.
+    """
+    labels = {one.name: [*one.terms] for one in system.variables}
+
+    def joint(when: Condition | None, block: RuleBlock) -> Condition | None:
+        if when is None:
+            return None
+        kind = Or if isinstance(when, Or) else And
+        groups: dict[str, list[Condition]] = {name: [] for name in labels}
+        for part in operands(when, block):
+            groups[next(questions(part)).variable].append(part)
+        for name, parts in groups.items():
+            if len(parts) > 1 or any(not isinstance(p, Proposition) for p in parts):
+                points, _ = joint_points(combined(kind, parts), labels, block)
+                groups[name] = [Proposition(name, (_label_of(labels[name], points),))]
+        return combined(kind, itertools.chain.from_iterable(groups.values()))
+
+    blocks = tuple(
+        replace(
+            block,
+            rules=tuple(replace(r, when=joint(r.when, block)) for r in block.rules),
+        )
+        for block in system.blocks
+    )
+    inputs = (replace(v, terms=tuple(labels[v.name])) for v in system.variables)
+    return replace(system, variables=tuple(inputs), blocks=blocks)
+
+
+def _label_of(labels: list[Term], points: Points) -> str:
+    """Return the name of the term with some points, which is added if there is none."""
+    for label in labels:
+        if label.function == points and label.height == 1.0:
+            return label.name
+    labels.append(Term(unlike("joint", [one.name for one in labels]), points))
+    return labels[-1].name
 
 
 def joint_points(
