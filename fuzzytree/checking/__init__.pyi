@@ -26,6 +26,7 @@ from .converting import load_content as load_content
 from .converting import proved as proved
 from .converting import read as read
 from .converting import read_content as read_content
+from .converting import reading_format as reading_format
 from .converting import refuse_unreadable as refuse_unreadable
 from .dependencies import Because as Because
 from .dependencies import Graph as Graph

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -26,6 +27,7 @@ from fuzzytree.model import (
     Loss,
     Model,
     ModelKind,
+    ModelPath,
     ModelSource,
     Option,
     Reading,
@@ -34,6 +36,7 @@ from fuzzytree.model import (
     check_options,
     kind_of,
     loss_text,
+    option_value,
     sampled_values,
 )
 from fuzzytree.semantics import (
@@ -105,12 +108,36 @@ class Conversion(msgspec.Struct, frozen=True):
     proof: Proof
 
 
-def format_of(path: str | os.PathLike[str]) -> Format:
-    """Return the format that a file's suffix names.
+def reading_format(name: str) -> Format:
+    """Return a format by its name, and read as an engine does whose name follows.
 
     Raises:
-        ReadError: If there is none.
+        ValueError: If there is no such format, or the reader knows no such dialect.
+
+    Example:
+        >>> reading_format("fcl:jfuzzylogic").name
+        'fcl'
+        >>> reading_format("fis:iec")
+        Traceback (most recent call last):
+        ValueError: dialect: must be matlab, octave, fuzzylite, not 'iec'
     """
+    name, colon, dialect = name.partition(":")
+    form = find_format(name)
+    if not colon or form.read is None:
+        return form
+    option_value(msgspec.structs.replace(form, write=form.read), "dialect", dialect)
+    read = functools.partial(form.read, dialect=dialect)
+    return msgspec.structs.replace(form, read=read)
+
+
+def format_of(path: str | os.PathLike[str]) -> Format:
+    """Return the format in which a file is read, by its suffix or as it is named.
+
+    Raises:
+        ReadError: If the suffix names none.
+    """
+    if isinstance(path, ModelPath) and path.read_as is not None:
+        return reading_format(path.read_as)
     name, suffix = os.fspath(path) or "''", Path(path).suffix
     try:
         return find_format(suffix or "no suffix")
@@ -135,14 +162,15 @@ def read(path: str | os.PathLike[str], *, format: str | None = None) -> Reading:
 
     Args:
         path: The file.
-        format: The name of its format; the one of its suffix unless given.
+        format: The name of its format, and perhaps of a dialect, such as
+            `fcl:jfuzzylogic`; the one of its suffix unless given.
 
     Raises:
         ReadError: If the file cannot be read, or says something wrong; the message
             lists all mistakes with their lines.
-        ValueError: If there is no such format.
+        ValueError: If there is no such format or dialect.
     """
-    form = find_format(format) if format else format_of(path)
+    form = reading_format(format) if format else format_of(path)
     refuse_unreadable(form, os.fspath(path))
     return read_content(read_bounded(path), form, name=os.fspath(path))
 
@@ -190,7 +218,7 @@ def load(
     Args:
         path: The file.
         allow_loss: Whether to read what the model cannot hold as near as it can.
-        format: The name of its format; the one of its suffix unless given.
+        format: As in `read`.
 
     Raises:
         ReadError: If the file cannot be read, or says something wrong; the message
@@ -592,7 +620,7 @@ def convert(
     Args:
         source: The path of a file, a model as in `as_model`, or what was read.
         to: The name of a format, or a suffix such as `.fll`.
-        format: Of the file; the one of its suffix unless given.
+        format: Of the file, as in `read`.
         allow_loss: Whether to read and write what has no place as near as it can.
         representation: `tree`, `rules` or `system`; what the format carries unless
             given.
@@ -621,7 +649,7 @@ def convert(
     elif isinstance(source, str | os.PathLike):
         reading = read(source, format=format)
         name = os.fspath(source)
-        read_as = (find_format(format) if format else format_of(source)).name
+        read_as = (reading_format(format) if format else format_of(source)).name
     else:
         reading = Reading(as_model(source))
     name = name or reading.model.name

@@ -23,8 +23,8 @@ from fuzzytree.cli.console import (
     TableOptions,
     allow_loss_option,
     answer_styled,
-    argument,
     flag,
+    model_argument,
     option,
     output_option,
     progress_bar,
@@ -55,7 +55,7 @@ For example:
 class AuditOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument("MODEL")
+    model: str = model_argument()
     data: str | None = option(
         "--data TABLE", "Table of rows that the audit counts; `-` is standard input."
     )

@@ -109,7 +109,7 @@ def table_of(data: str | None, options: TableOptions) -> object:
 
 _REPEATED = (
     *("data", "target", "config", "spreads", "budget", "row"),
-    *("within", "limits", "settings"),
+    *("within", "limits", "settings", "read_as"),
 )
 """The parameters that the command of an answer has."""
 

@@ -15,7 +15,7 @@ from fuzzytree.cli.console import (
     TableOptions,
     answer,
     answer_json,
-    argument,
+    model_argument,
     option,
     output_option,
     progress_bar,
@@ -36,7 +36,7 @@ INTERRUPTED = 130
 class BenchOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument("MODEL")
+    model: str = model_argument()
     data: str | None = option(
         "--data TABLE",
         "Table of rows to measure on; rows from the model's ranges by default.",

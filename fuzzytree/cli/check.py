@@ -14,6 +14,7 @@ from fuzzytree.cli.console import (
     argument,
     data_option,
     flag,
+    model_argument,
     option,
     progress_bar,
     rows_only_option,
@@ -28,7 +29,7 @@ from fuzzytree.model import Kind
 class CheckOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument("MODEL")
+    model: str = model_argument()
     files: Sequence[str] = argument("[FILES]...", nargs=-1)
     data: str | None = data_option
     runtimes: Sequence[str] = runtimes_option

@@ -17,7 +17,13 @@ import msgspec
 
 from fuzzytree.errors import FuzzyTreeError, TableError
 from fuzzytree.files import check_places
-from fuzzytree.model import as_names, printable, printable_json, printable_lines
+from fuzzytree.model import (
+    ModelPath,
+    as_names,
+    printable,
+    printable_json,
+    printable_lines,
+)
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -77,6 +83,30 @@ def argument(metavar: str, **about: Any) -> Any:
     return functools.partial(click.argument, metavar=metavar, **about)
 
 
+def model_argument(metavar: str = "MODEL") -> Any:
+    """Return the argument of a model's file, and the option `--from` of its format."""
+    return functools.partial(_with_format, metavar=metavar)
+
+
+def _with_format(name: str, *, metavar: str) -> Callable[[Any], Any]:
+    text = "Format of the model, and perhaps whose meaning counts, such as fll or "
+    text += "fcl:jfuzzylogic; from its suffix by default."
+    read_as = option("--from FORMAT", text, is_eager=True)("read_as")
+    model = click.argument(name, metavar=metavar, callback=_named)
+    return lambda verb: read_as(model(verb))
+
+
+def _named(context: click.Context, _parameter: object, path: str) -> ModelPath:
+    from fuzzytree.checking import reading_format
+
+    result = ModelPath(path)
+    result.read_as = context.params["read_as"]
+    if result.read_as is not None:
+        with wrong_options():
+            reading_format(result.read_as)
+    return result
+
+
 OUTPUT = click.Path(readable=False)
 """The type of an option or an argument that names a file to write."""
 
@@ -119,7 +149,8 @@ def takes(
         inputs: list[str] = [
             name
             for name, one in parameters
-            if one.func is click.argument or one.keywords.get("metavar") in _INPUTS
+            if one.func in (click.argument, _with_format)
+            or one.keywords.get("metavar") in _INPUTS
         ]
 
         @functools.wraps(function)
@@ -136,7 +167,7 @@ def takes(
         vars(command)["headings"] = {
             name: getattr(base, "heading", "Options")
             for base in record.__mro__
-            for name in vars(base)
+            for name in [*vars(base), "read_as"]
         }
         return command
 

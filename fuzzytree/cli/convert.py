@@ -16,6 +16,7 @@ from fuzzytree.cli.console import (
     answer_bytes,
     answer_json,
     argument,
+    model_argument,
     option,
     progress_bar,
     say,
@@ -43,18 +44,15 @@ from fuzzytree.model import (
 
 if TYPE_CHECKING:
     from fuzzytree.checking import Proof
-    from fuzzytree.model import Option
+    from fuzzytree.model import ModelPath, Option
     from fuzzytree.numerics import Certificate
 
 
 class ConvertOptions(WritingOptions):
     """The arguments and options of the verb."""
 
-    source: str = argument("IN")
+    source: ModelPath = model_argument("IN")
     output: str = argument("OUT", type=OUTPUT)
-    read_as: str | None = option(
-        "--from FORMAT", "Format of IN; from its suffix by default."
-    )
     dialect: str | None = option(
         "--dialect NAME", "Dialect of OUT; that of IN where both have one format."
     )
@@ -87,7 +85,7 @@ def command(options: ConvertOptions) -> int:
     form = wanted_format(options.output, options.to)
     with wrong_options():
         values = option_values(form, given)
-    found, used = read_source(options.source, options.read_as)
+    found, used = read_source(options.source)
     head = f"{used}: {document_text(found.model)}"
     notes = [("read", options.source, head)]
     return carry(
@@ -111,25 +109,22 @@ def option_values(
     return options
 
 
-def read_source(source: str, read_as: str | None) -> tuple[Reading, str]:
+def read_source(source: ModelPath) -> tuple[Reading, str]:
     """Return what a file or standard input holds, and the name of its format."""
     from fuzzytree import checking
     from fuzzytree.errors import ReadError
-    from fuzzytree.exporters import find_format
 
-    if source != "-":
-        with wrong_options():
-            form = find_format(read_as) if read_as else checking.format_of(source)
-        return checking.read(source, format=form.name), form.name
-    if read_as is None:
+    if source == "-" and source.read_as is None:
         raise click.UsageError("`-` has no suffix; name the format with --from")
-    with wrong_options():
-        form = find_format(read_as)
+    form = checking.format_of(source)
+    read_as = source.read_as or form.name
+    if source != "-":
+        return checking.read(source), read_as
     checking.refuse_unreadable(form, "standard input")
     content = standard_input().read(LIMIT + 1)
     if len(content) > LIMIT:
         raise ReadError(f"standard input: is larger than {LIMIT} bytes")
-    return checking.read_content(content, form, name="standard input"), form.name
+    return checking.read_content(content, form, name="standard input"), read_as
 
 
 def carry(
@@ -162,7 +157,7 @@ def carry(
     options = in_dialect(options, found, form)
     facts: dict[str, object] = {
         "read": {
-            "file": source,
+            "file": str(source),
             "format": read_as,
             **report.document_facts(found.model),
             "losses": found.losses,
@@ -294,10 +289,12 @@ def next_check(*files: tuple[str, str], more: Sequence[str] = ()) -> str:
     """
     from fuzzytree.exporters import TABLE, find_format
 
-    for number, (path, form) in enumerate(files):
+    for number, (path, name) in enumerate(files):
+        form, _, dialect = name.partition(":")
         found = find_format(form)
         is_readable = found.read is not None or (number > 0 and form in TABLE)
-        suffix = Path(path).suffix.lower()
-        if path == "-" or not is_readable or suffix not in found.suffixes:
+        is_other = dialect or Path(path).suffix.lower() not in found.suffixes
+        if path == "-" or not is_readable or (is_other and number):
             return ""
+        more = [*more, "--from", name] if is_other else more
     return shlex.join(["fuzzytree", "check", *(path for path, _ in files), *more])

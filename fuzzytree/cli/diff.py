@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import click
 
@@ -13,6 +14,7 @@ from fuzzytree.cli.console import (
     allow_loss_option,
     answer_result,
     argument,
+    model_argument,
     option,
     progress_bar,
     several,
@@ -20,12 +22,13 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
+from fuzzytree.model import ModelPath
 
 
 class DiffOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
-    old: str = argument("OLD")
+    old: ModelPath = model_argument("OLD")
     new: str = argument("NEW")
     data: str | None = option(
         "--data TABLE", "Table of rows that both models classify."
@@ -49,15 +52,19 @@ def command(options: DiffOptions) -> int:
 
     Rules and terms are matched by their content, not by their order. Decisions are
     proved equal, or a point is shown at which they differ. Exit 1 if a decision
-    changes, or if programs that call the model must change.
+    changes, or if programs that call the model must change. `--from` is for OLD, and
+    for NEW if it has the same suffix.
     """
     from fuzzytree import api
     from fuzzytree.report import diff_lines
 
+    new = ModelPath(options.new)
+    if Path(new).suffix.lower() == Path(options.old).suffix.lower():
+        new.read_as = options.old.read_as
     with wrong_options(), progress_bar(quiet=options.quiet) as show:
         found = api.diff(
             options.old,
-            options.new,
+            new,
             data=table_source(options.data, options),
             limits=limits_of(options.limits),
             budget_s=options.budget,

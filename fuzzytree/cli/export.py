@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 
 from fuzzytree.cli.console import (
-    argument,
     flag,
+    model_argument,
     option,
     output_option,
     takes,
@@ -17,12 +17,13 @@ from fuzzytree.cli.representation import (
     WritingOptions,
     wanted_format,
 )
+from fuzzytree.model import ModelPath
 
 
 class ExportOptions(WritingOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument("MODEL")
+    model: ModelPath = model_argument()
     output: str = output_option(
         "-o --output FILE", "File to write; `-` is stdout.", required=True
     )
@@ -75,5 +76,5 @@ def command(options: ExportOptions) -> int:
     form = wanted_format(options.output, options.to)
     with wrong_options():
         check_names(form, values)
-    found, read_as = read_source(options.model, None)
+    found, read_as = read_source(options.model)
     return carry(found, options.model, read_as, form, options, options=values)

@@ -12,8 +12,8 @@ from fuzzytree.cli.console import (
     TableOptions,
     answer,
     answer_json,
-    argument,
     data_option,
+    model_argument,
     option,
     output_option,
     progress_bar,
@@ -25,13 +25,13 @@ from fuzzytree.cli.console import (
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.model import Use
+    from fuzzytree.model import ModelPath, Use
 
 
 class NeedsOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument("MODEL")
+    model: ModelPath = model_argument()
     data: str | None = data_option
     output: str | None = output_option(
         "-o --output FILE",
@@ -107,11 +107,9 @@ def command(options: NeedsOptions) -> int:
     if options.output is not None:
         after = f"predicts some rows differently from {options.model}"
         if found.is_same:
-            files = [
-                (one, find_format(Path(one).suffix).name)
-                for one in (options.model, options.output)
-            ]
-            check = next_check(*files)
+            names = (options.model.read_as, None)
+            files = zip((options.model, options.output), names, strict=True)
+            check = next_check(*((f, name or Path(f).suffix) for f, name in files))
             after = f"next: {check}" if check else ""
         say_rows(("wrote", options.output, after), quiet=options.quiet)
     return 0

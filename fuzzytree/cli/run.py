@@ -20,6 +20,7 @@ from fuzzytree.cli.console import (
     allow_loss_option,
     argument,
     flag,
+    model_argument,
     option,
     output_option,
     progress_bar,
@@ -60,7 +61,7 @@ _GROUP = 1 << 26  # bytes of rows that a binary file gets at a time
 class RunOptions(TableOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument("MODEL")
+    model: str = model_argument()
     table: str = argument("TABLE")
     output: str = output_option(
         "-o --output FILE",

@@ -10,7 +10,7 @@ from fuzzytree.cli.console import (
     ResultOptions,
     answer,
     answer_json,
-    argument,
+    model_argument,
     output_option,
     say,
     takes,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 class ShowOptions(ResultOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument("MODEL")
+    model: str = model_argument()
     picture: str | None = output_option(
         "--picture FILE", "Picture of the tree to write, as .svg or .png."
     )

@@ -10,8 +10,8 @@ from fuzzytree.cli.console import (
     FullResultOptions,
     TableOptions,
     answer_result,
-    argument,
     data_option,
+    model_argument,
     progress_bar,
     runtimes_option,
     several,
@@ -24,7 +24,7 @@ from fuzzytree.cli.console import (
 class StabilityOptions(TableOptions, FullResultOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument("MODEL")
+    model: str = model_argument()
     data: str | None = data_option
     select: Sequence[str] = several(
         "--select CODE", "Check to apply, such as N3 (repeat); all by default."

@@ -27,6 +27,7 @@ from .contracts import Locate as Locate
 from .contracts import Loss as Loss
 from .contracts import Model as Model
 from .contracts import ModelKind as ModelKind
+from .contracts import ModelPath as ModelPath
 from .contracts import ModelSource as ModelSource
 from .contracts import Outcome as Outcome
 from .contracts import Prepared as Prepared

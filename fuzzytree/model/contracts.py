@@ -50,6 +50,18 @@ class Fitted(Protocol):
 ModelSource = Document | Fitted | str | os.PathLike[str]
 """What public functions take as a model; `checking.converting.as_model` reads it."""
 
+
+class ModelPath(str):
+    """The path of a model's file.
+
+    Attributes:
+        read_as: The name of its format, as `checking.reading_format` takes it; None for
+            the one of its suffix.
+    """
+
+    read_as: str | None = None
+
+
 ModelKind = Literal["tree", "rules", "system"]
 Dtype = Literal["float64", "mixed", "float32"]
 
@@ -142,7 +154,8 @@ class Format(msgspec.Struct, frozen=True):
         carries: What the format can hold.
         write: Model to bytes.
         read: Bytes and a name for messages to a reading; None if it cannot be read.
-            Raises ReadError with all mistakes of the file.
+            Raises ReadError with all mistakes of the file. Its keyword `dialect`, if
+            it has one, is a Literal of those whose meaning a file can have.
         cannot: What it cannot hold, a sentence each.
         extra: The optional packages it needs, if any.
         dtype: The number type in which a file of it computes, unless the writer's
@@ -153,7 +166,7 @@ class Format(msgspec.Struct, frozen=True):
     suffixes: tuple[str, ...]
     carries: tuple[ModelKind, ...]
     write: Writer
-    read: Callable[[bytes, str], Reading] | None = None
+    read: Callable[..., Reading] | None = None
     cannot: tuple[str, ...] = ()
     extra: str | None = None
     dtype: Dtype | None = None

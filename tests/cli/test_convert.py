@@ -22,6 +22,7 @@ from fuzzytree.semantics.random_systems import random_system
 from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
+from tests.formats.test_fcl import EITHER
 
 HELP = "\n  fuzzytree convert --help lists the options\n"
 SYSTEMS = [form.name for form in all_formats() if "system" in form.carries]
@@ -606,3 +607,63 @@ def test_a_file_stays_in_its_dialect(
     assert ft.convert(f"a{suffix}", suffix).written.content == (
         Path(f"a{suffix}").read_bytes()
     )
+
+
+VERBS = {
+    "show": (),
+    "run": ("r.csv",),
+    "check": (),
+    "audit": (),
+    "diff": ("grip.yaml",),
+    "bench": (),
+    "needs": (),
+    "stability": (),
+    "export": ("-o", "a.yaml"),
+    "convert": ("a.yaml",),
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_that_reads_a_model_takes_its_format_and_engine(
+    call: Call, verb: str
+) -> None:
+    words = (verb, "grip.yaml", *VERBS[verb], "--from", "fis:iec")
+    code, out, err = call(*words)
+    assert (code, out) == (2, "")
+    assert err == (
+        "dialect: must be matlab, octave, fuzzylite, not 'iec'\n"
+        f"  fuzzytree {verb} --help lists the options\n"
+    )
+
+
+def test_the_named_engine_is_the_one_that_a_rule_is_read_for(call: Call) -> None:
+    Path("e.fcl").write_text(EITHER)
+    Path("r.csv").write_text("a,c,d\n.9,.1,.2\n")
+    code, _, err = call("run", "e.fcl", "r.csv")
+    assert (code, err) == (
+        2,
+        "e.fcl: a model cannot hold all that the file says:\n"
+        "  line 10: a OR b AND c is read as a OR (b AND c), as in the standard; "
+        "jFuzzyLogic reads (a OR b) AND c; write parentheses, or pass --from fcl:iec "
+        "or --from fcl:jfuzzylogic\n"
+        "  pass --allow-loss to read it as stated\n",
+    )
+    for engine, answer in (("jfuzzylogic", 20.0), ("iec", 90.0 / 1.7)):
+        words = ("--from", f"fcl:{engine}")
+        code, out, _ = call("run", "e.fcl", "r.csv", *words)
+        assert code == 0
+        assert float(out.split("\n")[1].split(",")[0]) == pytest.approx(answer)
+        code, _, err = call("convert", "e.fcl", f"{engine}.yaml", *words)
+        assert code == 0
+        after = err.rpartition("next     fuzzytree ")[2].split()
+        assert after == ["check", "e.fcl", f"{engine}.yaml", *words]
+        assert call("check", *after[1:], "--generate", "50")[0] == 0
+        assert call("diff", "e.fcl", f"{engine}.yaml", *words)[0] == 0
+    assert call("diff", "e.fcl", "jfuzzylogic.yaml", "--from", "fcl:iec")[0] == 1
+
+
+def test_an_audit_of_a_named_engine_is_repeated_for_it(call: Call) -> None:
+    Path("e.fcl").write_text(EITHER)
+    out = call("audit", "e.fcl", "--from", "fcl:iec", "--verbose")[1]
+    assert "fuzzytree audit e.fcl --from fcl:iec --select" in out
+    assert "e.fcl:10:" in out  # rules have their lines

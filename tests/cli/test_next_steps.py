@@ -116,9 +116,10 @@ def test_what_follows_writing_works_with_every_format(
     taken(call, err)
 
 
-def test_what_a_suffix_does_not_say_is_not_checked(call: Call) -> None:
+def test_what_a_suffix_does_not_say_is_an_option_or_not_checked(call: Call) -> None:
     as_fll = ("convert", "tipper.txt", "new.yaml", "--from", "fll")
-    assert steps(call, *as_fll) == []
+    (after,) = steps(call, *as_fll)
+    assert after == ["check", "tipper.txt", "new.yaml", "--from", "fll"]
     assert steps(call, "convert", "grip.yaml", "new.bin", "--to", "onnx") == []
     (after,) = steps(call, "convert", "grip.yaml", "new.onnx")
     assert after == ["check", "grip.yaml", "new.onnx"]
