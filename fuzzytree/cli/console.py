@@ -7,6 +7,7 @@ import functools
 import glob
 import itertools
 import sys
+import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -441,29 +442,45 @@ def progress_bar(
 ) -> Generator[Callable[[str, float | None], None]]:
     """Give a function that shows the current work and its share in [0, 1], if known.
 
-    A bar appears on stderr, only on a terminal, and only after half a second.
+    A bar appears on stderr, only on a terminal, and only after half a second, also
+    where one piece of work takes longer.
     """
     if quiet or not sys.stderr.isatty():
         yield lambda _text, _share: None
         return
     begin = time.monotonic()
     bars: list[Progress] = []
+    work: list[tuple[str, float | None]] = []
+    lock = threading.Lock()
+
+    def draw() -> None:
+        with lock:
+            if not work:  # none yet, or the end
+                return
+            if not bars:
+                bars.append(_new_bar())
+            text, share = work[-1]
+            shown = printable(text).replace("[", r"\[")  # what rich takes for a style
+            task = bars[0].tasks[0]
+            task.total = None if share is None else 1.0
+            bars[0].update(task.id, description=shown, completed=share or 0.0)
 
     def show(text: str, share: float | None) -> None:
-        if not bars:
-            if time.monotonic() - begin < _PATIENCE_S:
-                return
-            bars.append(_new_bar())
-        shown = printable(text).replace("[", r"\[")  # what rich takes for a style
-        task = bars[0].tasks[0]
-        task.total = None if share is None else 1.0
-        bars[0].update(task.id, description=shown, completed=share or 0.0)
+        work[:] = [(text, share)]
+        if bars or time.monotonic() - begin >= _PATIENCE_S:
+            draw()
 
+    timer = threading.Timer(_PATIENCE_S, draw)
+    timer.daemon = True
+    timer.start()
     try:
         yield show
     finally:
-        for bar in bars:
-            bar.stop()
+        timer.cancel()
+        with lock:
+            work.clear()
+            for bar in bars:
+                bar.stop()
 
 
 def _new_bar() -> Progress:

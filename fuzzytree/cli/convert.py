@@ -85,7 +85,7 @@ def command(options: ConvertOptions) -> int:
     form = wanted_format(options.output, options.to)
     with wrong_options():
         values = option_values(form, given)
-    found, used = read_source(options.source)
+    found, used = read_source(options.source, quiet=options.quiet)
     head = f"{used}: {document_text(found.model)}"
     notes = [("read", options.source, head)]
     return carry(
@@ -109,7 +109,7 @@ def option_values(
     return options
 
 
-def read_source(source: ModelPath) -> tuple[Reading, str]:
+def read_source(source: ModelPath, *, quiet: bool) -> tuple[Reading, str]:
     """Return what a file or standard input holds, and the name of its format."""
     from fuzzytree import checking
     from fuzzytree.errors import ReadError
@@ -119,7 +119,9 @@ def read_source(source: ModelPath) -> tuple[Reading, str]:
     form = checking.format_of(source)
     read_as = source.read_as or form.name
     if source != "-":
-        return checking.read(source), read_as
+        with progress_bar(quiet=quiet) as show:
+            show(f"reading {source}", None)
+            return checking.read(source), read_as
     checking.refuse_unreadable(form, "standard input")
     content = standard_input().read(LIMIT + 1)
     if len(content) > LIMIT:

@@ -76,5 +76,5 @@ def command(options: ExportOptions) -> int:
     form = wanted_format(options.output, options.to)
     with wrong_options():
         check_names(form, values)
-    found, read_as = read_source(options.model)
+    found, read_as = read_source(options.model, quiet=options.quiet)
     return carry(found, options.model, read_as, form, options, options=values)

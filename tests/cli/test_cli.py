@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -192,6 +194,53 @@ def test_a_bar_waits_half_a_second(
     with progress_bar() as show:
         show("learning [/b]\x1b[2J", 0.5)
     assert r"learning [/b]\x1b[2J" in capsys.readouterr().err
+
+
+def test_a_bar_appears_while_one_long_piece_of_work_goes_on(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waiting: list[Callable[[], None]] = []
+
+    class Timer:
+        def __init__(self, _seconds: float, function: Callable[[], None]) -> None:
+            waiting.append(function)
+
+        def start(self) -> None:
+            """Wait for the test."""
+
+        cancel = start
+
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setattr("fuzzytree.cli.console.threading.Timer", Timer)
+    monkeypatch.setattr("fuzzytree.cli.console._PATIENCE_S", 1e9)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress_bar() as show:
+        waiting[0]()
+        assert capsys.readouterr().err == ""
+        show("reading grip.yaml", None)
+        waiting[0]()
+    assert "reading grip.yaml" in capsys.readouterr().err
+    waiting[0]()
+    assert capsys.readouterr().err == ""
+
+
+def test_a_conversion_reports_its_progress_from_reading_on(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    texts: list[str] = []
+
+    @contextlib.contextmanager
+    def bar(**_: object) -> Iterator[Callable[[str, float | None], None]]:
+        yield lambda text, _share: texts.append(text)
+
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("fuzzytree.cli.convert.progress_bar", bar)
+    assert main(["convert", "grip.yaml", "new.yaml"]) == 0
+    assert texts == [
+        "reading grip.yaml",
+        "writing yaml",
+        "comparing yaml with the model",
+    ]
 
 
 def test_main_takes_the_words_of_the_process(
