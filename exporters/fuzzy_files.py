@@ -109,13 +109,7 @@ def without_heights(system: FuzzySystem, to: str, losses: list[Loss]) -> FuzzySy
 
 
 def grid_losses(output: SystemOutput, usual: Defuzzifier, whose: str) -> Iterator[Loss]:
-    """Yield that a file does not say where an output's curve is sampled.
-
-    Args:
-        output: The output.
-        usual: The samples and the grid that the file stands for.
-        whose: The format, and who takes these.
-    """
+    """Yield that a file stands for other samples, the usual ones of its engine."""
     how = output.defuzzifier
     has_curve = not all(isinstance(one.function, Singleton) for one in output.terms)
     own, other = (how.samples, how.grid), (usual.samples, usual.grid)

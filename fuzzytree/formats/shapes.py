@@ -49,19 +49,15 @@ def trapezoid(numbers: Sequence[float], engine: Engine) -> Trapezoid:
         return Trapezoid(a, b, c, d)
     low = None if a == -math.inf or b <= -FAR else a
     high = None if d == math.inf or c >= FAR else d
-    if b <= -FAR and c >= FAR:
-        b = c = 0.0
-    elif b <= -FAR:
-        b = c
-    elif c >= FAR:
-        c = b
+    b = b if b > -FAR else min(c, 0.0) if c >= FAR else c
+    c = c if c < FAR else b
     low = b if low == math.nextafter(b, -math.inf) else low
     high = c if high == math.nextafter(c, math.inf) else high
     return Trapezoid(low, b, c, high)
 
 
 def rectangle(numbers: Sequence[float], engine: Engine) -> Curve:
-    """Return 1 between two ends; fuzzylite takes them in any order."""
+    """Return 1 between two ends, which fuzzylite takes in any order."""
     start, end = sorted(numbers) if engine == "fuzzylite" else numbers
     return Trapezoid(start, start, end, end)
 

@@ -13,18 +13,8 @@ from typing import Final, Literal, TypeVar
 
 import msgspec
 
-from fuzzytree.formats.shapes import (
-    Engine,
-    Maker,
-    binary,
-    difference_of,
-    line,
-    ramp,
-    rectangle,
-    s_shape,
-    trapezoid,
-    triangle,
-)
+from fuzzytree.formats import shapes
+from fuzzytree.formats.shapes import Engine, Maker
 from fuzzytree.model import (
     Arc,
     Bell,
@@ -159,26 +149,26 @@ Of a number between bars the size counts, and not the sign.
 
 
 SHAPE_WORDS: Final[Mapping[Maker, Words]] = {
-    triangle: Words(
+    shapes.triangle: Words(
         "TRIAN a b c", "Triangle a b c", "trimf a b c", "triangularShape a b c"
     ),
-    trapezoid: Words(
+    shapes.trapezoid: Words(
         "TRAPE a b c d", "Trapezoid a b c d", "trapmf a b c d", "trapezoidShape a b c d"
     ),
-    partial(line, falls=True): Words(fis="linzmf a b", fml="leftLinearShape a b"),
-    line: Words(fis="linsmf a b", fml="rightLinearShape a b"),
-    s_shape: Words(fll="SShape start end", fis="smf start end", fml="sShape a b"),
-    partial(s_shape, falls=True): Words(
-        fll="ZShape start end", fis="zmf start end", fml="zShape a b"
+    partial(shapes.line, falls=True): Words(
+        "", "", "linzmf a b", "leftLinearShape a b"
     ),
-    ramp: Words(fll="Ramp start end", fuzzylite_fis="rampmf start end"),
-    rectangle: Words(
-        fll="Rectangle start end",
-        fml="rectangularShape a b",
-        fuzzylite_fis="rectmf start end",
+    shapes.line: Words("", "", "linsmf a b", "rightLinearShape a b"),
+    shapes.s_shape: Words("", "SShape start end", "smf start end", "sShape a b"),
+    partial(shapes.s_shape, falls=True): Words(
+        "", "ZShape start end", "zmf start end", "zShape a b"
     ),
-    binary: Words(
-        fll="Binary start direction", fuzzylite_fis="binarymf start direction"
+    shapes.ramp: Words("", "Ramp start end", fuzzylite_fis="rampmf start end"),
+    shapes.rectangle: Words(
+        "", "Rectangle start end", "", "rectangularShape a b", "rectmf start end"
+    ),
+    shapes.binary: Words(
+        "", "Binary start direction", "", "", "binarymf start direction"
     ),
 }
 """The words for membership functions whose numbers mean another one in some order."""
@@ -279,7 +269,7 @@ def _spelled(kind: type[SystemCurve], text: str) -> tuple[str, FunctionWord]:
         values = [0.0] * len(order)
         for place, number, one in zip(order, numbers, marked, strict=True):
             values[place] = abs(number) if one.startswith("|") else number
-        return difference_of(_built(kind, values), engine)
+        return shapes.difference_of(_built(kind, values), engine)
 
     def numbers_of(curve: Curve) -> Sequence[float] | None:
         if type(curve) is not kind:

@@ -52,12 +52,7 @@ ModelSource = Document | Fitted | str | os.PathLike[str]
 
 
 class ModelPath(str):
-    """The path of a model's file.
-
-    Attributes:
-        read_as: The name of its format, as `checking.reading_format` takes it; None for
-            the one of its suffix.
-    """
+    """A path with the format to read; None is the suffix's (`reading_format`)."""
 
     read_as: str | None = None
 

@@ -108,7 +108,8 @@ def read_fcl(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     dialect, sentence, is_certain = detected(text, dialect)
     notes.remark(sentence)
     title, blocks = blocks_of(text, notes)
-    known = known_variables(blocks, dialect, notes, is_certain=is_certain)
+    known = FclVariables({}, {}, dialect, notes, is_certain)
+    describe_variables(blocks, known)
     inputs = tuple(read_input(one, known) for one in known.inputs)
     outputs = tuple(read_output(one, known) for one in known.outputs)
     labels = {one.name: [label.name for label in one.terms] for one in inputs}
@@ -233,22 +234,15 @@ class FclVariables(msgspec.Struct, frozen=True):
     outputs: dict[str, FclVariable]
     dialect: Dialect
     notes: ReaderNotes
-    is_certain: bool = True
+    is_certain: bool
 
     def mistake(self, token: Token, sentence: str) -> None:
         """Note a mistake at a token."""
         self.notes.mistake(place(token), sentence)
 
 
-def known_variables(
-    blocks: Sequence[FclBlock],
-    dialect: Dialect,
-    notes: ReaderNotes,
-    *,
-    is_certain: bool,
-) -> FclVariables:
-    """Return the variables of a file; mistakes are noted."""
-    known = FclVariables({}, {}, dialect, notes, is_certain)
+def describe_variables(blocks: Sequence[FclBlock], known: FclVariables) -> None:
+    """Add the variables of a file; mistakes are noted."""
     for kind, variables in (("VAR_INPUT", known.inputs), ("VAR_OUTPUT", known.outputs)):
         for block in blocks:
             if block.kind == kind:
@@ -261,7 +255,6 @@ def known_variables(
         if name in known.inputs:
             token = known.outputs[name].token
             known.mistake(token, f"{name!r} is an input and an output")
-    return known
 
 
 def _declare(

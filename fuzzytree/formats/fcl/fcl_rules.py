@@ -61,7 +61,7 @@ class Scope(msgspec.Struct, frozen=True):
     curved: Collection[str]
     dialect: Dialect
     notes: ReaderNotes
-    is_certain: bool = True
+    is_certain: bool
 
 
 def _read(text: RuleStatement, number: int, scope: Scope) -> SystemRule:

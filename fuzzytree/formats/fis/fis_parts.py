@@ -317,7 +317,9 @@ def _curve(
     if kind in ("constant", "linear"):
         result = _conclusion_number(kind, numbers, about, notes)
     else:
-        if about[1] == "fuzzylite" and words.has_height(kind, len(numbers)):
+        word = words.FIS_KINDS.get(kind)
+        one_more = len(numbers) % 2 if word is None else len(numbers) == word.arity + 1
+        if about[1] == "fuzzylite" and one_more:
             height = numbers.pop()
         result = words.curve_of(kind, numbers, about[1])
         if about[2] is not None and about[2][0] and about[1] != "fuzzylite":

@@ -105,18 +105,6 @@ def curve_of(
     return next(curve.mistakes(), curve)
 
 
-def has_height(kind: str, count: int) -> bool:
-    """Return whether the last of so many numbers is a height, as fuzzylite writes it.
-
-    Example:
-        >>> has_height("trimf", 4), has_height("trimf", 3), has_height("discretemf", 5)
-        (True, False, True)
-    """
-    if kind == "discretemf":
-        return count % 2 == 1
-    return kind in FIS_KINDS and count == FIS_KINDS[kind].arity + 1
-
-
 def _points(numbers: Sequence[float]) -> Curve | str:
     if len(numbers) % 2 or not numbers:
         return f"a 'discretemf' has pairs of numbers (x y x y ...), not {len(numbers)}"

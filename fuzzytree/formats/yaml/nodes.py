@@ -176,13 +176,10 @@ def _decoded(content: bytes, name: str) -> str:
         sentence = f"{byte}; the file must be saved as UTF-8"
         raise report(name, [(*position_behind(before), sentence)]) from error
     check_characters(text, name, _FORBIDDEN)
-    check_characters(
-        text,
-        name,
-        _OLD_LINE_ENDS,
+    why = (
         "ends a line in YAML 1.1 and not in YAML 1.2; leave it out, or write it as an "
-        "escape in double quotes",
     )
+    check_characters(text, name, _OLD_LINE_ENDS, f"{why}escape in double quotes")
     return text
 
 
