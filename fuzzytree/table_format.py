@@ -12,7 +12,7 @@ import msgspec
 from fuzzytree.cells import number_of
 
 _SEPARATORS = {",": ",", ".": r"\.", "'": "['\u2019]", " ": "[ \u00a0\u2009\u202f]"}
-_LEAST_SHARE = 0.9  # of the texts of a column
+_LEAST_SHARE = 0.9  # of the texts of a column that are no usual numbers
 
 
 class TableFormat(msgspec.Struct, frozen=True, kw_only=True):
@@ -106,15 +106,15 @@ def number_hint(texts: Sequence[str]) -> str:
         >>> print(number_hint(["1,065"]))
         numbers such as '1,065'; pass --thousands , or --decimal ,
     """
+    others = [text for text in texts if number_of(text) is None]
     is_percent = any(text.rstrip().endswith("%") for text in texts)
     forms: dict[TableFormat, list[str]] = {}
     for marks in ("." if is_percent else ".,", ",", ",.", ". ", ", ", ".'", ",'"):
         decimal, thousands = marks[0], marks[1:]
         form = TableFormat(decimal=decimal, thousands=thousands, percent=is_percent)
-        numbers = filter(form.pattern().fullmatch, texts)
-        forms[form] = [text for text in numbers if number_of(text) is None]
+        forms[form] = [*filter(form.pattern().fullmatch, others)]
     most = max(map(len, forms.values()))
-    if most < max(1, _LEAST_SHARE * len(texts)):
+    if most < max(1, _LEAST_SHARE * len(others), 0.1 * len(texts)):
         return ""
     best = [form for form, numbers in forms.items() if len(numbers) == most]
     is_both = best[0].thousands == best[1 % len(best)].decimal == ","

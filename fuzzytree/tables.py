@@ -784,7 +784,7 @@ def _with_plain_numbers(
     Raises:
         TableError: If a column that is not categorical has another number.
     """
-    cells = [*piece.cells]
+    cells, typed = [*piece.cells], {*piece.texts}
     for place, (name, column) in enumerate(zip(piece.columns, cells, strict=True)):
         if isinstance(column, np.ndarray) and column.dtype.kind in REAL:
             continue
@@ -801,11 +801,12 @@ def _with_plain_numbers(
         for k in others:
             texts[k] = values[k]
         cells[place] = [texts[k] for k in indices]
+        typed -= set() if texts == values else {name}
         if hasattr(column, "chunks"):
             import pyarrow as pa
 
             cells[place] = pa.chunked_array([cells[place]], pa.string())
-    return msgspec.structs.replace(piece, cells=(*cells,))
+    return msgspec.structs.replace(piece, cells=(*cells,), texts=[*typed])
 
 
 def class_names(cells: Sequence[Cells]) -> list[str | None]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import polars as pl
 import pyarrow as pa
 import pytest
 
@@ -188,6 +189,9 @@ def test_a_row_to_predict_names_the_option_that_reads_it() -> None:
 def test_texts_of_a_frame_are_read_as_they_are_written() -> None:
     frame = pd.DataFrame({"hue": ["0,48", None, 3], "grip": ["a", "b", "b"]})
     table = read_table(ft.table(frame, format=TableFormat(decimal=",")), target="grip")
+    np.testing.assert_array_equal(table.values, [[0.48, np.nan, 3.0]])
+    texts = pl.DataFrame({"hue": ["0,48", None, "3"], "grip": ["a", "b", "b"]})
+    table = read_table(ft.table(texts, format=TableFormat(decimal=",")), target="grip")
     np.testing.assert_array_equal(table.values, [[0.48, np.nan, 3.0]])
 
 
