@@ -74,7 +74,9 @@ def peak_of_reading(read: Callable[[], object]) -> tuple[int, str]:
 def test_a_huge_file_is_refused_by_its_size_or_its_beginning(
     tmp_path: Path, name: str, begin: bytes, size: int, fault: str
 ) -> None:
-    read = {"s": Learner.load, "a": read_frames, "m": ft.load}[name[0]]
+    readers: dict[str, Callable[[Path], object]]
+    readers = {"s": Learner.load, "a": read_frames, "m": ft.load}
+    read = readers[name[0]]
     path = tmp_path / name
     with path.open("wb") as file:
         file.write(begin)
@@ -83,7 +85,7 @@ def test_a_huge_file_is_refused_by_its_size_or_its_beginning(
         read(tmp_path / f"absent{path.suffix}")  # so that what it imports is there
     peak, text = peak_of_reading(lambda: read(path))
     assert text == f"{path}: {fault}"
-    assert peak < 2**20
+    assert peak < 2**24  # what is imported as well
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ each cut and the floats beside it, is true for every input.
 
 from __future__ import annotations
 
+import bisect
 import itertools
 import math
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from typing import TypeVar
 from msgspec.structs import replace
 
 from fuzzytree.model import (
+    Band,
     FloatArray,
     FuzzyTree,
     Node,
@@ -23,7 +25,7 @@ from fuzzytree.model import (
     RuleBase,
     shapes_of,
 )
-from fuzzytree.semantics.reference import proposition_degree
+from fuzzytree.semantics.reference import degree, proposition_degree
 
 _Model = TypeVar("_Model", bound=FuzzyTree | RuleBase)
 
@@ -98,19 +100,28 @@ def node_faults(tree: FuzzyTree) -> Iterator[str]:
     """
     shapes = shapes_of(tree.variables)
     for number, node in enumerate(tree.nodes, 1):
-        propositions = [
-            Proposition(node.variable, branch.terms) for branch in node.branches
-        ]
-        for point in node_points(node):
-            owner = node.owners[sum(1 for cut in node.cuts if point > cut)]
-            for index, proposition in enumerate(propositions):
-                result = proposition_degree(proposition, shapes, point)
-                if (result == 1.0) != (index == owner):
-                    yield (
-                        f"node {number}: at {node.variable} = {point!r} branch "
-                        f"{index + 1} has degree {result!r}, and branch {owner + 1} "
-                        "owns the point"
-                    )
+        points = node_points(node)
+        full: list[set[int]] = [set() for _ in points]  # branches of degree 1
+        for index, branch in enumerate(node.branches):
+            for term in branch.terms:
+                shape, start, stop = shapes[node.variable, term], 0, len(points)
+                if isinstance(shape, Band):  # below 1 off its plateau
+                    if shape.low is not None:
+                        start = bisect.bisect_right(points, shape.low)
+                    if shape.high is not None:
+                        stop = bisect.bisect_right(points, shape.high)
+                for place in range(start, stop):
+                    if degree(shape, points[place]) == 1.0:
+                        full[place].add(index)
+        for point, branches in zip(points, full, strict=True):
+            owner = node.owners[bisect.bisect_left(node.cuts, point)]
+            for index in sorted(branches ^ {owner}):
+                proposition = Proposition(node.variable, node.branches[index].terms)
+                yield (
+                    f"node {number}: at {node.variable} = {point!r} branch {index + 1} "
+                    f"has degree {proposition_degree(proposition, shapes, point)!r}, "
+                    f"and branch {owner + 1} owns the point"
+                )
 
 
 def node_points(node: Node) -> tuple[float, ...]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.model.rulebase import Band, Semantics, Term, Variable
+from fuzzytree.model.rulebase import Band, Semantics, Shape, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.crisp_regions import (
     axis_points,
@@ -15,7 +15,7 @@ from fuzzytree.semantics.crisp_regions import (
     node_faults,
 )
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.reference import descend, evaluate
+from fuzzytree.semantics.reference import degree, descend, evaluate
 from fuzzytree.testing import random_tree
 
 
@@ -90,6 +90,44 @@ def test_a_term_that_stays_one_beyond_its_plateau_is_a_fault() -> None:
         "and branch 1 owns the point",
         "node 1: at x = 1.0 branch 2 has degree 1.0, and branch 1 owns the point",
     ]
+
+
+def test_the_terms_of_a_node_are_looked_at_only_where_they_may_be_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cuts = tuple(map(float, range(1000)))
+    ends = (-1.0, *cuts, 1000.0)
+    terms = tuple(
+        Term(
+            f"t{k}",
+            Band(
+                low=None if k == 0 else ends[k],
+                high=None if k == 1000 else ends[k + 1],
+                left=None if k == 0 else ends[k] - 0.5,
+                right=None if k == 1000 else ends[k + 1] + 0.5,
+            ),
+        )
+        for k in range(1001)
+    )
+    owners = tuple(k % 2 for k in range(1001))
+    names = [tuple(f"t{k}" for k in range(own, 1001, 2)) for own in (0, 1)]
+    branches = (Branch(names[0], leaf=1), Branch(names[1], leaf=2))
+    tree = FuzzyTree(
+        "t",
+        ("a", "b"),
+        (Variable("x", terms),),
+        (Node("x", cuts, owners, branches),),
+        (Leaf("a"), Leaf("b")),
+    )
+    calls: list[float] = []
+
+    def counting(shape: Shape, value: float) -> float:
+        calls.append(value)
+        return degree(shape, value)
+
+    monkeypatch.setattr("fuzzytree.semantics.crisp_regions.degree", counting)
+    assert not list(node_faults(tree))
+    assert len(calls) <= 2 * len(axis_points(tree)["x"])
 
 
 def _without_checks(tree: FuzzyTree, variables: tuple[Variable, ...]) -> FuzzyTree:
