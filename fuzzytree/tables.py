@@ -148,6 +148,7 @@ _KINDS = {
     b"\x1f\x8b": "gzip",
     b"\x28\xb5\x2f\xfd": "zstd",
 }
+_CODECS = ("gzip", "zstd")
 _ENCODINGS = {
     codecs.BOM_UTF32_LE: "utf-32",  # which begins like the next one
     codecs.BOM_UTF16_LE: "utf-16",
@@ -286,8 +287,8 @@ def table(
         >>> table(np.array([[1.5], [2.5]]), columns=["force"]).columns
         ['force']
     """
-    form = format or TableFormat()
-    return TableSource(source, columns, form, tuple(as_names(categorical)))
+    categories = tuple(as_names(categorical))
+    return TableSource(source, columns, format or TableFormat(), categories)
 
 
 def path_of(source: object) -> str | None:
@@ -791,6 +792,8 @@ def _with_plain_numbers(
         indices, values = distinct_values(column)
         texts = [form.plain(one) if isinstance(one, str) else one for one in values]
         others = [k for k, one in enumerate(values) if one is not None is texts[k]]
+        if texts == [*values]:
+            continue
         if others and name not in categorical:
             row = int(np.isin(indices, others).argmax())
             raise TableError(
@@ -801,7 +804,7 @@ def _with_plain_numbers(
         for k in others:
             texts[k] = values[k]
         cells[place] = [texts[k] for k in indices]
-        typed -= set() if texts == values else {name}
+        typed.discard(name)
         if hasattr(column, "chunks"):
             import pyarrow as pa
 
@@ -1134,10 +1137,8 @@ def _refuse_rounded(
     for row in np.flatnonzero(np.abs(values) >= EXACT).tolist():
         text = str(cells[row]).strip()
         if _WHOLE.fullmatch(text) and int(text) != float(values[row]):
-            raise TableError(
-                f"{piece.where(row)}: column {name!r} holds {text}, which a double "
-                f"rounds{hint}"
-            )
+            text = f"column {name!r} holds {text}, which a double rounds{hint}"
+            raise TableError(f"{piece.where(row)}: {text}")
 
 
 def _numbers_of(
@@ -1333,10 +1334,8 @@ def _header_hint(columns: Sequence[str]) -> str:
     numbers = sum(math.isfinite(number_of(c) or math.nan) for c in columns)
     if 2 * numbers < len(columns):
         return ""
-    return (
-        "\n  its first row looks like data; pass --no-header to name the columns "
-        "'column 1', 'column 2', ..."
-    )
+    text = "its first row looks like data; pass --no-header to name the columns"
+    return f"\n  {text} 'column 1', 'column 2', ..."
 
 
 def _named(name: str, written: Sequence[str]) -> tuple[str, ...]:
@@ -1470,6 +1469,9 @@ def _stream_pieces(
             raise TableError(f"{name} {what if head else 'is empty'}")
         yield from _csv_pieces(*_utf8(head, stream.read, form, name), name, form, only)
         return
+    raw = type(getattr(stream, "raw", None)).__name__
+    if kind in _CODECS and raw == "CompressedInputStream":
+        raise TableError(f"{name}: is compressed twice; decompress it first")
     if stream.seekable():
         stream.seek(-len(head), io.SEEK_CUR)
     else:

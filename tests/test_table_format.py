@@ -190,6 +190,9 @@ def test_texts_of_a_frame_are_read_as_they_are_written() -> None:
     frame = pd.DataFrame({"hue": ["0,48", None, 3], "grip": ["a", "b", "b"]})
     table = read_table(ft.table(frame, format=TableFormat(decimal=",")), target="grip")
     np.testing.assert_array_equal(table.values, [[0.48, np.nan, 3.0]])
+    frame["day"] = pd.Timestamp("2024-01-31")
+    source = ft.table(frame, format=TableFormat(decimal=","))
+    assert read_table(source, target="grip").dates == ("day",)
     texts = pl.DataFrame({"hue": ["0,48", None, "3"], "grip": ["a", "b", "b"]})
     table = read_table(ft.table(texts, format=TableFormat(decimal=",")), target="grip")
     np.testing.assert_array_equal(table.values, [[0.48, np.nan, 3.0]])
@@ -248,6 +251,9 @@ def test_an_encoding_is_read_and_an_unknown_one_refused() -> None:
 def test_broken_compression_is_one_sentence() -> None:
     assert _error(gzip.compress(PLAIN.encode())[:30]) == (
         "t.csv: broken gzip file: truncated compressed stream"
+    )
+    assert _error(gzip.compress(gzip.compress(PLAIN.encode()))) == (
+        "t.csv: is compressed twice; decompress it first"
     )
 
 

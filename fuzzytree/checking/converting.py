@@ -557,14 +557,6 @@ def in_dialect(
     return {"dialect": dialect, **options} if name == form.name else {**options}
 
 
-def in_dialect(
-    options: Mapping[str, Option], reading: Reading, form: Format
-) -> dict[str, Option]:
-    """Return a writer's options, with the dialect of what was read in its format."""
-    name, _, dialect = reading.dialect.partition(":")
-    return {"dialect": dialect, **options} if name == form.name else {**options}
-
-
 def _certified(model: Model, form: Format, dtype: object) -> Proof:
     from fuzzytree.numerics import certify
 

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from fuzzytree.table_format import TableFormat
 
 Name = TypeVar("Name", str, str | None)
-Option = functools.partial[Any]
 Record = TypeVar("Record")
 Code = TypeVar("Code", int, None, int | None)
 
@@ -65,7 +64,7 @@ def option(
     if choices:
         about["type"] = click.Choice(choices)
     if default is not None:
-        about |= {"default": default, "show_default": default != ""}
+        about |= {"default": default, "show_default": True}
     return functools.partial(click.option, *names, help=help, **about)
 
 
@@ -138,38 +137,32 @@ def takes(
     """
 
     def decorate(function: Callable[[Record], Code]) -> Callable[..., Code]:
-        parameters: list[tuple[str, Option]] = [
-            (name, value)
+        parameters: list[tuple[str, functools.partial[Any], str]] = [
+            (name, parameter, getattr(base, "heading", "Options"))
             for base in record.__mro__
-            for name, value in vars(base).items()
-            if isinstance(value, functools.partial)
+            for name, parameter in vars(base).items()
+            if isinstance(parameter, functools.partial)
         ]
-        outputs: list[str] = [
-            n for n, one in parameters if one.keywords.get("type") is OUTPUT
-        ]
-        inputs: list[str] = [
+        outputs = {n for n, one, _ in parameters if one.keywords.get("type") is OUTPUT}
+        inputs = {
             name
-            for name, one in parameters
+            for name, one, _ in parameters
             if one.func in (click.argument, _with_format)
             or one.keywords.get("metavar") in _INPUTS
-        ]
+        }
 
         @functools.wraps(function)
         def command(**values: Any) -> Code:
             if written := _texts(values, outputs):
-                others = _texts(values, {*inputs} - {*outputs})
+                others = _texts(values, inputs - outputs)
                 check_places(written, itertools.chain(*map(_files, others)))
             options = record()
             vars(options).update(values)
             return function(options)
 
-        for name, parameter in reversed(parameters):
+        for name, parameter, _ in reversed(parameters):
             parameter(name)(command)
-        vars(command)["headings"] = {
-            name: getattr(base, "heading", "Options")
-            for base in record.__mro__
-            for name in [*vars(base), "read_as"]
-        }
+        vars(command)["headings"] = {name: title for name, _, title in parameters}
         return command
 
     return decorate
@@ -233,35 +226,25 @@ class TableOptions:
     """The options of a verb that reads a table: how it is written."""
 
     heading: str = "Table"
-
-    delimiter: str = option(
+    delimiter: str | None = option(
         "--delimiter CHARACTER",
         "Character between the cells of a CSV file; by default from its first line.",
-        default="",
     )
-    decimal: str = option(
-        "--decimal CHARACTER",
-        "Character before the decimals of a number: `.` or `,`.",
-        default=".",
+    decimal: str | None = option(
+        "--decimal CHARACTER", "What stands before decimals: `.`, the default, or `,`."
     )
-    thousands: str = option(
-        "--thousands CHARACTER",
-        "Character that groups the digits of a number: `,` `.` `'` or a blank.",
-        default="",
+    thousands: str | None = option(
+        "--thousands CHARACTER", "What groups digits: `,` `.` `'` or a blank."
     )
     percent: bool = flag("--percent", "Read 104% as the number 1.04.")
-    encoding: str = option(
+    encoding: str | None = option(
         "--encoding NAME",
-        "Encoding of a CSV file; UTF-8, or UTF-16 if it says so, by default.",
-        default="",
+        "Encoding of a CSV file; by default UTF-8, or what its mark says.",
     )
-    header: bool = flag(
-        "--no-header",
-        "Read the first row of a table as data; the columns are `column 1`, ...",
-        flag_value=False,
-        default=True,
+    no_header: bool = flag(
+        "--no-header", "Read the first row as data too; the columns are `column 1`, ..."
     )
-    sheet: str = option("--sheet NAME", "Sheet of an Excel file to read.", default="")
+    sheet: str | None = option("--sheet NAME", "Sheet of an Excel file to read.")
 
 
 ignore_option = several("--ignore COLUMN", "Column that is no input (repeat).")
@@ -378,10 +361,10 @@ def table_format(options: TableOptions) -> TableFormat:
     """
     from fuzzytree.table_format import TableFormat
 
+    values = {name: vars(options).get(name) for name in TableFormat.__struct_fields__}
+    values["header"] = not options.no_header
     with wrong_options():
-        return TableFormat(
-            **{name: getattr(options, name) for name in TableFormat.__struct_fields__}
-        )
+        return TableFormat(**{k: one for k, one in values.items() if one is not None})
 
 
 def table_source(
