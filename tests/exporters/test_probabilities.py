@@ -214,14 +214,14 @@ def test_check_runs_programs_with_probabilities(
     rules = rules_of(1)
     content = write(rules, probabilities=True, **options).content
     rows = probed(rules, None, 40)
-    found = [*check_program("it", ProgramFile(name, content), rules, rows, rules.kind)]
+    found = [*check_program("it", ProgramFile(name, content), rules, rows, "relative")]
     assert [one.verdict for one in found if isinstance(one, Comparison)][:2] == [
         "agrees",
         "agrees",
     ]
     other = write(rated(rules, 9), probabilities=True, **options).content
     wrong = [
-        *check_program("it", ProgramFile(name, other, True), rules, rows, rules.kind)
+        *check_program("it", ProgramFile(name, other, True), rules, rows, "relative")
     ]
     verdicts = [one.verdict for one in wrong if isinstance(one, Comparison)]
     assert verdicts[0] in ("DISAGREES", "rows only")
