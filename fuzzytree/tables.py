@@ -70,14 +70,7 @@ from fuzzytree.columns import (
     text_of,
     text_order,
 )
-from fuzzytree.csv_rows import (
-    BLOCK,
-    CsvRows,
-    blocks,
-    counted,
-    no_text,
-    number_array,
-)
+from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, counted, no_text, number_array
 from fuzzytree.errors import MissingExtraError, TableError, install_hint
 from fuzzytree.files import LIMIT, check_stream, reason
 from fuzzytree.model import (
@@ -107,10 +100,8 @@ T = TypeVar("T")
 _Coded: TypeAlias = tuple[IntArray, list[tuple[str, bool]], str]
 _Faults = dict[str, tuple[str, str, int]]  # where the first is, its text, how many
 
-SUFFIXES = (
-    *(".csv", ".csv.gz", ".csv.zst", ".xlsx"),
-    *(".parquet", ".pq", ".arrow", ".feather"),
-)
+_CSV = (".csv", ".csv.gz", ".csv.zst")
+SUFFIXES = (*_CSV, ".xlsx", ".parquet", ".pq", ".arrow", ".feather")
 """How the names of files end that are tables in a folder."""
 
 PIECE = 1 << 14
@@ -740,41 +731,32 @@ def pieces(
         columns = source.columns if columns is None else columns
         form = source.format if form == TableFormat() else form
         source = source.source
-    result = _pieces_as_written(source, columns, form, name, only)
+    result: Iterator[TablePiece]
+    match source:
+        case str() | os.PathLike():
+            path = cast("str | os.PathLike[str]", source)
+            result = _file_pieces(path, form, name, only)
+        case io.TextIOBase():
+            result = _text_pieces(source, name or "the table", form, only)
+        case io.BufferedReader() | io.BytesIO():
+            result = _stream_pieces(source, name or "the table", form, only)
+        case np.ndarray():
+            array = cast("npt.NDArray[np.generic]", source)
+            names = None if columns is None else as_names(columns)
+            result = iter([_array_piece(array, names, name or "the array")])
+        case _ if type(source).__name__ == "RecordBatch":
+            batch = cast("pa.RecordBatch", source)
+            result = _batch_pieces([batch], name or "the table", only)
+        case _ if hasattr(source, "read_next_batch"):
+            reader = cast("pa.RecordBatchReader", source)
+            parts = itertools.chain([reader.schema.empty_table()], reader)
+            result = _batch_pieces(parts, name or "the table", only)
+        case _:
+            result = iter([_frame_piece(source, name or "the table", only=only)])
     if form.is_plain:
         return result
     texts = frozenset(_categorical_of(whole))
     return (_with_plain_numbers(piece, form, texts) for piece in result)
-
-
-def _pieces_as_written(
-    source: object,
-    columns: Sequence[str] | None,
-    form: TableFormat,
-    name: str | None,
-    only: Only,
-) -> Iterator[TablePiece]:
-    match source:
-        case str() | os.PathLike():
-            path = cast("str | os.PathLike[str]", source)
-            return _file_pieces(path, form, name, only)
-        case io.TextIOBase():
-            return _text_pieces(source, name or "the table", form, only)
-        case io.BufferedReader() | io.BytesIO():
-            return _stream_pieces(source, name or "the table", form, only)
-        case np.ndarray():
-            array = cast("npt.NDArray[np.generic]", source)
-            names = None if columns is None else as_names(columns)
-            return iter([_array_piece(array, names, name or "the array")])
-        case _ if type(source).__name__ == "RecordBatch":
-            batch = cast("pa.RecordBatch", source)
-            return _batch_pieces([batch], name or "the table", only)
-        case _ if hasattr(source, "read_next_batch"):
-            reader = cast("pa.RecordBatchReader", source)
-            parts = itertools.chain([reader.schema.empty_table()], reader)
-            return _batch_pieces(parts, name or "the table", only)
-        case _:
-            return iter([_frame_piece(source, name or "the table", only=only)])
 
 
 def _with_plain_numbers(
@@ -1007,8 +989,11 @@ def columns_of(
         texts = held.texts or (examples.get("text", ("", ""))[1],)
         is_hinted = kind == "text" and not is_declared
         hint = number_hint(texts) if is_hinted else ""
-        if kind is None or hint:
-            mixed[name] = _mixed_text(table, name, held, examples, hint)
+        if hint:
+            where = examples.get("text", (table,))[0]
+            mixed[name] = f"{where}: column {name!r} holds {hint}"
+        elif kind is None:
+            mixed[name] = _mixed_text(table, name, held, examples)
         elif kind == "text" and held.is_identifier(is_categorical=is_declared):
             count = "more than 10,000" if held.texts is None else len(held.texts)
             text = (
@@ -1044,15 +1029,9 @@ def columns_of(
 
 
 def _mixed_text(
-    table: str,
-    name: str,
-    held: Contents,
-    first: Mapping[str, tuple[str, str]],
-    hint: str,
+    table: str, name: str, held: Contents, first: Mapping[str, tuple[str, str]]
 ) -> str:
-    """Return that the cells of a column do not go together, or are other numbers."""
-    if hint:
-        return f"{first.get('text', (table,))[0]}: column {name!r} holds {hint}"
+    """Return that the cells of a column do not go together."""
     counts = {
         "number": held.number,
         "truth value": held.boolean,
