@@ -472,6 +472,10 @@ def test_a_coa_of_jfuzzylogic_that_is_another_one_is_a_remark() -> None:
     ) in _read(text).remarks
 
 
+def test_a_file_of_pyit2fls_is_written_again_in_the_dialect_that_it_reads() -> None:
+    assert _read(PYIT2FLS).dialect == "fcl:iec"
+
+
 def test_a_file_of_pyit2fls_is_read_with_its_hundred_values() -> None:
     reading = _read(PYIT2FLS)
     assert isinstance(reading.model, FuzzySystem)

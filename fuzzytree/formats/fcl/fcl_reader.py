@@ -129,7 +129,8 @@ def read_fcl(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     except InvalidModelError as error:
         raise report(name, placed(positions(), error.mistakes)) from error
     model, facts = _model(joined_by_number(system), text.text, notes)
-    return notes.reading(model, locating(positions, facts), f"fcl:{dialect}")
+    written_as = "iec" if dialect == "pyit2fls" else dialect  # which PyIT2FLS reads
+    return notes.reading(model, locating(positions, facts), f"fcl:{written_as}")
 
 
 def _groups(variables: Mapping[str, FclVariable]) -> Iterator[PositionGroup]:
