@@ -86,7 +86,7 @@ def random_system(
 
     Example:
         >>> [len(block.rules) for block in random_system(3).blocks]
-        [4, 4]
+        [2, 6]
     """
     return _Maker(seed, formulas, has_odd_names).system(
         inputs, outputs, rules, defuzzifier
