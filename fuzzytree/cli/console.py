@@ -92,11 +92,11 @@ def _with_format(name: str, *, metavar: str) -> Callable[[Any], Any]:
     text = "Format of the model, and perhaps whose meaning counts, such as fll or "
     text += "fcl:jfuzzylogic; from its suffix by default."
     read_as = option("--from FORMAT", text, is_eager=True)("read_as")
-    model = click.argument(name, metavar=metavar, callback=_named)
+    model = click.argument(name, metavar=metavar, callback=_model_path)
     return lambda verb: read_as(model(verb))
 
 
-def _named(context: click.Context, _parameter: object, path: str) -> ModelPath:
+def _model_path(context: click.Context, _parameter: object, path: str) -> ModelPath:
     from fuzzytree.checking import reading_format
 
     result = ModelPath(path)
