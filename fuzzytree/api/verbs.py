@@ -397,6 +397,7 @@ def check(
         limit=chosen.limit,
         rows_only=chosen.rows_only,
         terms=chosen.terms,
+        tolerance=chosen.tolerance,
         progress=progress,
     )
 

@@ -28,6 +28,7 @@ from fuzzytree.checking.comparing import (
 )
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
+    TOLERANCE,
     Certified,
     Comparison,
     Conjunction,
@@ -41,7 +42,14 @@ from fuzzytree.model import (
     Use,
     kind_of,
 )
-from fuzzytree.numerics import decide, open_paths, strength_bounds
+from fuzzytree.numerics import (
+    ApproximateRules,
+    by_points,
+    decide,
+    open_paths,
+    short_above,
+    strength_bounds,
+)
 from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import forms, proof_faults, pruned, rules_from_tree
 
@@ -79,7 +87,7 @@ class CheckedModel:
     def __init__(
         self, model: Model, data: FloatArray | None, limit: int, terms: Kind
     ) -> None:
-        self.model, self.terms = model, terms
+        self.model, self.terms, self.tolerance = model, terms, TOLERANCE
         self.rows = probed(model, data, limit)
         native = baseline().load
         self.forms = {str(title): form for title, form in forms(model).items()}
@@ -168,7 +176,8 @@ class CheckedModel:
 
     def shipped(self, title: str, other: Any) -> Iterator[Finding]:
         """Compare a file that is read as a model: its content, then its answers."""
-        yield from _shipped(title, other, self.model, self.rows, self.terms)
+        terms, tolerance = self.terms, self.tolerance
+        yield from _shipped(title, other, self.model, self.rows, terms, tolerance)
 
     def foreign(self, file: OnnxModel) -> str | None:
         """Return why an ONNX file cannot be one of this model; None if it can be."""
@@ -268,7 +277,12 @@ def _contract(
 
 
 def _shipped(
-    title: str, other: Model, model: Model, rows: RowSet, terms: Kind
+    title: str,
+    other: Model,
+    model: Model,
+    rows: RowSet,
+    terms: Kind,
+    tolerance: float,
 ) -> Iterator[Finding]:
     if isinstance(other, FuzzyTree) and not isinstance(model, FuzzyTree):
         other = _as_rules(other, model) or other
@@ -286,6 +300,12 @@ def _shipped(
             return
     actual = ModelRun(title, other, baseline().load(other)(rows.values))
     base = native_base(expected or model, "float64", rows)
+    near = _near(base.model, other, tolerance)
+    if near is not None:
+        against = f"the model within {short_above(near.bound)}: curves became points"
+        yield counted("file", title, against, 1, ())
+        yield _within(actual, base, rows, near)
+        return
     is_like = expected is not None and other.classes == model.classes
     answers = (compare_bits if is_like else compare_answers)(actual, base, rows)
     if expected is None:
@@ -293,6 +313,28 @@ def _shipped(
     else:
         yield _content(title, other, expected, [answers])
     yield answers
+
+
+def _near(model: Model, other: Model, tolerance: float) -> ApproximateRules | None:
+    """Return rules with points for their curves, if a file holds these very rules."""
+    if not (isinstance(model, RuleBase) and isinstance(other, RuleBase)):
+        return None
+    try:
+        near = by_points(model, tolerance)
+    except LossError:
+        return None
+    return near if near.terms and near.model == other else None
+
+
+def _within(
+    actual: ModelRun, base: ModelRun, rows: RowSet, near: ApproximateRules
+) -> Comparison:
+    """Compare strengths within the bound of points, and what rounding adds to it."""
+    allowed = np.full(rows.numbers.shape, near.bound)
+    for run in (actual, base):
+        if isinstance(run.model, RuleBase):
+            allowed += strength_bounds(run.model, "float64", rows.values)[0]
+    return compare_within(actual, base, rows, allowed=allowed, origin=near.origin)
 
 
 def _as_rules(tree: FuzzyTree, model: RuleBase) -> RuleBase | None:

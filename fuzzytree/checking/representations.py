@@ -28,6 +28,7 @@ from fuzzytree.errors import FuzzyTreeError, LossError, ReadError
 from fuzzytree.model import (
     MOST_PROBES,
     MOST_SYSTEM_PROBES,
+    TOLERANCE,
     Agreement,
     Comparison,
     Count,
@@ -69,6 +70,7 @@ def check(
     limit: int | None = None,
     rows_only: bool = False,
     terms: Kind = "relative",
+    tolerance: float = TOLERANCE,
     progress: Progress | None = None,
 ) -> Agreement:
     """Compare every representation of a model with the model itself.
@@ -84,6 +86,7 @@ def check(
         limit: The most probes; as in `CheckSettings` if None.
         rows_only: Whether files whose rows agree are accepted with other content.
         terms: As in `CheckSettings`.
+        tolerance: As in `CheckSettings`.
         progress: Called with what is compared next and the share that is done.
 
     Returns:
@@ -109,6 +112,7 @@ def check(
         subject = CheckedSystem(model, data, limit or MOST_SYSTEM_PROBES)
     else:
         subject = CheckedModel(model, data, limit or MOST_PROBES, terms)
+        subject.tolerance = tolerance
     chosen = chosen_runtimes(runtimes)
     steps = [(form, runtime) for form in subject.outcomes for runtime in chosen]
     parts = len(steps) + len(files)

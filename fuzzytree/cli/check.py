@@ -49,6 +49,12 @@ class CheckOptions(TableOptions, FullResultOptions):
         choices=["relative", "raw"],
         default="relative",
     )
+    tolerance: float = option(
+        "--tolerance",
+        "Largest error of a degree where a file has points for a curve.",
+        type=float,
+        default=1e-6,
+    )
     allow_loss: bool = allow_loss_option
 
 
@@ -77,6 +83,7 @@ def command(options: CheckOptions) -> int:
                 rows_only=options.rows_only,
                 run_code=options.run_code,
                 terms=options.terms,
+                tolerance=options.tolerance,
             ),
             allow_loss=options.allow_loss,
             progress=show,

@@ -192,12 +192,18 @@ def carry(
     size = len(written.content)
     is_raw = isinstance(model, RuleBase) and model.kind == "raw"
     more = ("--terms", "raw") if is_raw and model is not found.model else ()
+    if isinstance(model, RuleBase) and form.read and "tolerance" in options:
+        more = (*more, "--tolerance", str(options["tolerance"]))
     after = next_check((source, read_as), (chosen.output, form.name), more=more)
     if after and found.losses:
         after += " --allow-loss"
     if kind_of(model) == "system" != kind_of(found.model):
         after = ""  # numbers are not compared with classes
-    shows = " (shows what the losses change)" if written.losses else ""
+    label, shows = "next", ""
+    if written.losses:
+        shows = " (shows what the losses change)"
+        if proof.verdict == "as listed" and kind_of(model) == "system":
+            label, shows = "differs", " (exits 1, and shows what the losses change)"
     lost = [f"lost     {loss_text(one)}" for one in (*found.losses, *written.losses)]
     coverage = proof.coverage.sentences if proof.coverage else ()
     remarks = (*found.remarks, *written.remarks, *coverage)
@@ -210,7 +216,7 @@ def carry(
     for lines in (lost, [f"remark   {text}" for text in remarks]):
         say_first(lines, verbose=chosen.verbose, quiet=chosen.quiet)
     if after:
-        say(f"next     {after}{shows}", quiet=chosen.quiet)
+        say(f"{label:<9}{after}{shows}", quiet=chosen.quiet)
     if chosen.as_json and chosen.output != "-":
         answer_json(
             {
@@ -224,7 +230,7 @@ def carry(
                 "proof": {"verdict": proof.verdict, "sentence": proof.sentence},
                 "certificate": _certificate_facts(proof.certificate),
                 "coverage": proof.coverage,
-                "next": after or None,
+                "next": after if label == "next" and after else None,
             }
         )
     return 0

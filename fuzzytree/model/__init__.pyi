@@ -1,6 +1,7 @@
 from . import curves as curves
 from .agreement import MOST_PROBES as MOST_PROBES
 from .agreement import MOST_SYSTEM_PROBES as MOST_SYSTEM_PROBES
+from .agreement import TOLERANCE as TOLERANCE
 from .agreement import Agreement as Agreement
 from .agreement import Basis as Basis
 from .agreement import Certified as Certified

@@ -158,6 +158,10 @@ MOST_PROBES, MOST_SYSTEM_PROBES = 20_000, 2_000
 """Of a tree or rules, and of a fuzzy system, whose rows cost more."""
 
 
+TOLERANCE = 1e-6
+"""The largest error of a degree in a file, unless its writer is told another one."""
+
+
 class FileContent(msgspec.Struct, frozen=True):
     """What a file that was compared holds.
 
@@ -183,12 +187,15 @@ class CheckSettings(msgspec.Struct, frozen=True, kw_only=True):
             its text is not what this version writes of the model.
         terms: Whether the file of a tree may hold `raw` rules, another function than
             the tree; tree and `relative` rules may always stand in it.
+        tolerance: The largest error of a degree where a file has points in the place
+            of a curve, as its writer was told.
     """
 
     limit: int | None = None
     rows_only: bool = False
     run_code: bool = False
     terms: Kind = "relative"
+    tolerance: float = TOLERANCE
 
 
 class Agreement(msgspec.Struct, frozen=True):

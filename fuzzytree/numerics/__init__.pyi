@@ -4,6 +4,7 @@ from .approximation import by_points as by_points
 from .bounds import Certificate as Certificate
 from .bounds import certify as certify
 from .bounds import open_paths as open_paths
+from .bounds import short_above as short_above
 from .bounds import strength_bounds as strength_bounds
 from .conditioning import Conduct as Conduct
 from .conditioning import conduct as conduct

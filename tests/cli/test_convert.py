@@ -245,12 +245,38 @@ def test_a_refusal_names_options_of_the_command_line(call: Call) -> None:
     assert err.endswith("; pass --set scores=rule or scores=class\n")
 
 
-def test_the_next_command_says_that_it_shows_what_losses_change(call: Call) -> None:
+def test_a_loss_without_a_bound_is_shown_by_a_check_that_exits_1(call: Call) -> None:
     words = ("convert", "tipper.fll", "a.fcl", "--allow-loss", "--tolerance", "0.01")
     code, out, err = call(*words, "--json")
-    hint = "fuzzytree check tipper.fll a.fcl"
-    assert (code, json.loads(out)["next"]) == (0, hint)
-    assert err.endswith(f"next     {hint} (shows what the losses change)\n")
+    assert (code, json.loads(out)["next"]) == (0, None)
+    check = ("check", "tipper.fll", "a.fcl")
+    command = f"fuzzytree {' '.join(check)}"
+    text = f"differs  {command} (exits 1, and shows what the losses change)\n"
+    assert err.endswith(text)
+    assert call(*check, "--generate", "50")[0] == 1
+
+
+def test_points_for_curves_are_allowed_within_the_bound_of_the_losses(
+    call: Call,
+) -> None:
+    ft.save(all_samples()["raw rules (LR curves)"], "raw.yaml")
+    words = ("convert", "raw.yaml", "a.fcl", "--tolerance", "0.01")
+    code, _, err = call(*words, "--allow-loss", "--json")
+    assert code == 0
+    check = ("check", "raw.yaml", "a.fcl")
+    after = f"fuzzytree {' '.join(check)} --tolerance 0.01"
+    assert err.endswith(f"next     {after} (shows what the losses change)\n")
+    code, out, _ = call(*check, "--tolerance", "0.01", "--generate", "200", "--json")
+    assert code == 0
+    rows, content = [
+        one
+        for one in reversed(json.loads(out)["comparisons"])
+        if one["representation"] == "a.fcl"
+    ]
+    assert content["against"] == "the model within 1.0e-02: curves became points"
+    assert 0.001 < rows["largest_difference"] <= rows["allowed"] <= 0.01
+    assert rows["origin"].startswith("largest certified error of a degree: lines")
+    assert call(*check, "--generate", "200")[0] == 1  # of another tolerance
 
 
 def test_no_command_comes_next_that_compares_numbers_with_classes(call: Call) -> None:

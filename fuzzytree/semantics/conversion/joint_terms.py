@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from fuzzytree import numerics
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
+    TOLERANCE,
     And,
     Condition,
     FuzzySystem,
@@ -32,9 +33,6 @@ from fuzzytree.semantics.conversion.points import shape_of
 
 EVERYWHERE = Points((0.0,), (1.0,))
 """Degree 1 at every value."""
-
-TOLERANCE = 1e-6
-"""The largest error of a degree in a file, unless its writer is given another one."""
 
 
 def operands(condition: Condition, block: RuleBlock) -> list[Condition]:
