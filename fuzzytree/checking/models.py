@@ -117,7 +117,7 @@ class CheckedModel:
         else:
             cost = sum(len(c.terms) + 1 for rule in model.rules for c in rule.when)
         cost += sum(len(variable.parts) + 1 for variable in model.variables)
-        most = max(_SLOW_STEPS // cost, 50)
+        most = max(_SLOW_STEPS // max(cost, 1), 50)
         return slice(None, None, -(-len(self.rows.numbers) // most))
 
     def own(self) -> Iterator[Finding]:

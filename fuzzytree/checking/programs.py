@@ -39,7 +39,7 @@ from fuzzytree.model import (
     option_value,
 )
 from fuzzytree.runtimes import ENGINES, Options
-from fuzzytree.semantics import forms, rules_from_tree
+from fuzzytree.semantics import as_rules, forms, rules_from_tree
 
 _MOST_ROWS: Final = 2_000  # that a program answers
 _LONGEST: Final = 80  # characters of a line
@@ -121,7 +121,8 @@ def _nearest(
     """
     write = cast("Callable[..., Written]", form.write)  # the options are its own
     best, most = None, -1
-    for document in _documents(model):
+    fault = ValueError("its numbers are no class of rules")
+    for document in _documents(model, form):
         try:
             written = write(document, allow_loss=True, **options)
         except ValueError as error:
@@ -139,10 +140,13 @@ def _nearest(
     return best
 
 
-def _documents(model: Document) -> Iterator[Document]:
+def _documents(model: Document, form: Format) -> Iterator[Document]:
     """Yield what a file may have been written of: a model, or rules made from it."""
     if isinstance(model, FuzzySystem):
-        yield model
+        if "system" in form.carries:
+            yield model
+        elif (rules := as_rules(model)) is not None:
+            yield rules
         return
     yield from forms(model).values()
     if isinstance(model, FuzzyTree):

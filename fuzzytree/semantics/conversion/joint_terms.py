@@ -31,6 +31,8 @@ from fuzzytree.model import (
 from fuzzytree.numerics import Lines
 from fuzzytree.semantics.conversion.points import shape_of
 
+_MOST = 1 << 16  # points of all joint terms, so that a file is read in seconds
+
 EVERYWHERE = Points((0.0,), (1.0,))
 """Degree 1 at every value."""
 
@@ -52,11 +54,14 @@ def with_joint_terms(system: FuzzySystem) -> FuzzySystem:
     """Return a system whose rules test each input once, in the order of the inputs.
 
     Raises:
-        LossError: As `joint_points`.
+        LossError: As `joint_points`, or if the joint terms have too many points.
     """
     labels = {one.name: [*one.terms] for one in system.variables}
+    joint_labels: dict[Condition, str] = {}
+    size = 0
 
     def joint(when: Condition | None, block: RuleBlock) -> Condition | None:
+        nonlocal size
         if when is None:
             return None
         kind = Or if isinstance(when, Or) else And
@@ -65,8 +70,14 @@ def with_joint_terms(system: FuzzySystem) -> FuzzySystem:
             groups[next(questions(part)).variable].append(part)
         for name, parts in groups.items():
             if len(parts) > 1 or any(not isinstance(p, Proposition) for p in parts):
-                points, _ = joint_points(combined(kind, parts), labels, block)
-                groups[name] = [Proposition(name, (_label_of(labels[name], points),))]
+                whole = combined(kind, parts)
+                if whole not in joint_labels:
+                    points, _ = joint_points(whole, labels, block)
+                    joint_labels[whole] = _label_of(labels[name], points)
+                    size += len(points.values)
+                    if size > _MOST:
+                        raise LossError(f"joint terms have more than {_MOST} points")
+                groups[name] = [Proposition(name, (joint_labels[whole],))]
         return combined(kind, itertools.chain.from_iterable(groups.values()))
 
     blocks = tuple(
