@@ -122,7 +122,7 @@ def test_what_follows_needs_works_with_every_format(call: Call, suffix: str) -> 
 WINE = str(EXAMPLES / "wine" / "wine.csv")
 LEARNED = {
     "tree of one leaf": (WINE, "cultivar", "--leaves", "1"),
-    "tree of single columns": (WINE, "cultivar", "--columns", "1"),
+    "tree of single columns": (WINE, "cultivar", "--columns-per-node", "1"),
     "tree of combinations": (WINE, "cultivar"),
     "tree of the paper": (WINE, "cultivar", "--mode", "paper"),
     "tree of categories": ("mixed.csv", "the class"),

@@ -496,3 +496,52 @@ def test_the_points_of_a_band_are_those_of_no_other(band: Band) -> None:
         degrees[place] /= 2.0
         other = Points(points.values, tuple(degrees))
         assert other == points or band_of(other) is None
+
+
+def twice(conjunction: str) -> RuleBase:
+    """Return rules that test an input twice, several terms of it, and none of them."""
+    low, high = (
+        Term("low", Band(high=2.0, right=4.0)),
+        Term("high", Band(2.0, None, 1.0)),
+    )
+    near = Term("near", Points((0.5, 2.5, 3.0), (0.0, 1.0, 0.5)))
+    terms = (low, high, near)
+    inputs = Variable("q r", terms), Variable("s", terms)
+    either = ("low", "high") if conjunction == "minimum" else ("low",)
+    rules = (
+        Rule((Proposition("s", ("low",)), Proposition("q r", ("low", "near"))), "a"),
+        Rule((Proposition("q r", ("high",)), Proposition("q r", ("near",))), "b"),
+        Rule((Proposition("q r", either, ("not",)),), "a"),
+        Rule((Proposition("s", ("near",), ("not",)),), "b"),
+        Rule((), "b"),
+    )
+    semantics = Semantics(conjunction)  # type: ignore[arg-type]  # both are given
+    return RuleBase("m", ("a", "b"), inputs, rules, semantics)
+
+
+@pytest.mark.parametrize("suffix", [".fcl", ".fll", ".fis", ".fml"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
+def test_rules_that_test_an_input_twice_come_back_from_each_format(
+    conjunction: str, suffix: str
+) -> None:
+    content = export(twice(conjunction), suffix, allow_loss=True).content
+    again = read_content(content, find_format(suffix), name="m").model
+    assert again == twice(conjunction)
+
+
+def test_a_joint_term_with_other_points_stands_for_no_propositions() -> None:
+    content = export(twice("minimum"), "fis", allow_loss=True).content
+    head, name, points = content.partition(b"'low_or_near'")
+    moved = head + name + points.replace(b" 4.0 ", b" 4.1 ", 1)
+    assert moved != content
+    again = read_content(moved, find_format("fis"), name="m").model
+    assert isinstance(again, FuzzySystem)
+
+
+def test_joint_terms_of_very_many_points_are_not_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    content = export(twice("minimum"), "fis", allow_loss=True).content
+    monkeypatch.setattr("fuzzytree.semantics.conversion.joint_terms._MOST", 8)
+    again = read_content(content, find_format("fis"), name="m").model
+    assert isinstance(again, FuzzySystem)
