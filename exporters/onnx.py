@@ -117,7 +117,8 @@ def write_onnx(
         opset: The version of the operators, 12 to 26.
         ir: The version of the file, 4 to 13.
         signature: `needed` for the model's inputs as columns, `all` for all columns
-            of the training table, of which the others are ignored.
+            of the training table, of which the others are ignored; so for a model that
+            needs none.
         outputs: Which outputs, in this order: unless given, `label` and `rule`, of a
             system `outputs` and `status`.
         readable: Whether each operation is a node, named after what it computes, such
@@ -244,9 +245,11 @@ def require(package: str, purpose: str) -> None:
 
 
 def _columns(model: Model | FuzzySystem, signature: Signature) -> tuple[str, ...]:
-    if isinstance(model, FuzzySystem) or signature == "needed":
-        return model.inputs
-    return model.columns
+    if not isinstance(model, FuzzySystem) and (
+        signature == "all" or not model.inputs  # rows of no column cannot be given
+    ):
+        return model.columns
+    return model.inputs
 
 
 def _model_proto(

@@ -25,7 +25,15 @@ import numpy as np
 from fuzzytree.columns import BOOLEANS
 from fuzzytree.errors import FuzzyTreeError, MissingExtraError
 from fuzzytree.exporters import beginning
-from fuzzytree.model import FloatArray, Model, Option, Outcome, RuleBase, Variable
+from fuzzytree.model import (
+    FloatArray,
+    Model,
+    Option,
+    Outcome,
+    RuleBase,
+    Variable,
+    unlike,
+)
 from fuzzytree.runtimes import c
 from fuzzytree.runtimes.rows import outcome_of
 from fuzzytree.semantics import Status
@@ -190,18 +198,25 @@ def _queried(
     """Return the answers of a query to a table with rows, categories as their names."""
     inputs = [one for one in model.variables if not one.parts]
     table = _quoted(str(options.get("table", "data")))
-    columns = ", ".join(f"{_quoted(one.name)} {_column_type(one)}" for one in inputs)
-    connection.execute(f"CREATE TABLE {table} ({columns})")
-    marks, width = ", ".join("?" * len(inputs)), len(inputs)
-    rows = [*zip(*map(_cells, inputs, values.tolist()), strict=True)]
+    number = _quoted(_row_name(model))
+    types = [f"{_quoted(one.name)} {_column_type(one)}" for one in inputs]
+    connection.execute(f"CREATE TABLE {table} ({', '.join([*types, number])} INTEGER)")
+    marks, width = ", ".join("?" * (len(inputs) + 1)), len(inputs)
+    cells = [*map(_cells, inputs, values.tolist()), range(values.shape[1])]
+    rows = [*zip(*cells, strict=True)]
     connection.executemany(f"INSERT INTO {table} VALUES ({marks})", rows)
     result = connection.execute(content.decode("utf-8")).fetchall()
-    kept = ([*map(_known_cells, some)] for some in (rows, (r[:width] for r in result)))
+    kept = ([_known_cells(row[:width]) for row in some] for some in (rows, result))
     if operator.ne(*kept):
         raise FuzzyTreeError("it does not give each row with its inputs, in order")
     answers = [row[width + 1 :] for row in result]
     outcome = outcome_of(model, answers, has_probabilities=_is_rated(options))
     return ProgramOutcome(outcome, tuple(row[width] for row in result))
+
+
+def _row_name(model: Model) -> str:
+    """Return the name of one more column, so that a table has one at least."""
+    return unlike("row", set(model.inputs))
 
 
 def _quoted(name: str) -> str:
@@ -238,15 +253,19 @@ def _pmml(
     pandas: Any = importlib.import_module("pandas")
     engine: Any = importlib.import_module("jpmml_evaluator")
     evaluator = engine.make_evaluator(content).verify()
-    table = pandas.DataFrame(dict(zip(model.inputs, values, strict=True)))
+    numbers = {_row_name(model): range(values.shape[1])}
+    columns = dict(zip(model.inputs, values, strict=True))
+    table = pandas.DataFrame(numbers | columns)
     result = evaluator.evaluateAll(table, error_col=None)[0]
     labels = tuple(None if one != one else one for one in result["answer"])
     count = len(model.rules) if isinstance(model, RuleBase) else 0
     names = [f"strength of rule {k}" for k in range(1, count + 1)]
     is_rated = _is_rated(options)
     shares = [f"probability of class {c}" for c in model.classes if is_rated]
-    replaced = [[one.missing is not None] for one in model.variables if not one.parts]
-    known: list[bool] = np.all(np.isfinite(values) | replaced, axis=0).tolist()
+    inputs = [one for one in model.variables if not one.parts]
+    replaced = np.array([one.missing is not None for one in inputs], np.bool_)
+    is_known = np.isfinite(values) | replaced.reshape(-1, 1)
+    known = np.logical_and.reduce(is_known, axis=0).tolist()
     rows = []
     for place, line in enumerate(result.to_dict("records")):
         identifier = str(line["rule"])  # of a node: no number where no rule decides

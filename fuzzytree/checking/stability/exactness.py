@@ -106,7 +106,9 @@ def offsets(
                 why = f"{representation} at {ratio:.0e}: {first_line(error)}"
                 trial.skipped.append(why)
                 continue
-            away = rows + np.array([[steps[name]] for name in model.inputs])
+            away = rows + np.array([steps[name] for name in model.inputs]).reshape(
+                -1, 1
+            )
             values = np.concatenate([probe_values(far, _PROBES), away], axis=1)
             checks = _observed(
                 representation, far, runtimes, values, trial.skipped, ratio
