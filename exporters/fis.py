@@ -134,8 +134,15 @@ def write(
     terms = FisTerms(system, dialect, tolerance)
     lines = _lines(system, terms)
     losses += terms.losses
+    private = [*_private_losses(terms, dialect)]
     if curves == "standard":
-        losses += _private_losses(terms, dialect)
+        losses += private
+    elif private and dialect != "fuzzylite":
+        remarks.append(
+            f"{private[0].where}: {private[0].what}; in all {len(private)} of the "
+            "terms need a function that docs/reference/fis.md shows, and "
+            "--set curves=standard counts them as losses"
+        )
     if losses and not allow_loss:
         raise refusal(model.name, "fis", losses)
     names = _naming(system, terms)

@@ -305,6 +305,23 @@ def test_every_line_of_a_small_file() -> None:
     )
 
 
+def test_a_curve_that_octave_lacks_is_remarked() -> None:
+    system = _sugeno(SystemRule(Proposition("a", ("low",)), (_small(),)))
+    step = Points((1.0, math.nextafter(1.0, 2.0), 2.0), (1.0, 0.5, 0.0))
+    first, second = system.variables
+    first = replace(first, terms=(Term("low", step),))
+    written = write(replace(system, variables=(first, second)))
+    assert (
+        "term 'low' of 'a': it is a discretemf, which MATLAB and Octave do not "
+        "have; in all 1 of the terms need a function that docs/reference/fis.md shows, "
+        "and --set curves=standard counts them as losses"
+    ) in written.remarks
+    assert not any(
+        "discretemf" in remark
+        for remark in write(system, dialect="fuzzylite", allow_loss=True).remarks
+    )
+
+
 def _small() -> Conclusion:
     return Conclusion("tip", "small")
 
