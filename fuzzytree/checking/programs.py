@@ -78,7 +78,7 @@ def check_program(
 ) -> Iterator[Finding]:
     """Compare a program with what is written now; run it if they are equal.
 
-    Raw rules of a tree must be wanted as `terms`.
+    Raw rules of a tree are not run unless `terms` wants them.
 
     Raises:
         MissingExtraError: If an engine is missing.
@@ -94,10 +94,11 @@ def check_program(
         yield counted("file", title, "a freshly written file", 1, (fault,))
         return
     yield file_content(title, nearest.form, options.get("dtype", "float64"))
-    faults = tuple(_faults(nearest.lines, lines))
     is_raw = isinstance(nearest.form, RuleBase) and nearest.form.kind == "raw"
     if is_raw and isinstance(model, FuzzyTree) and terms != "raw":
-        faults = (OTHER_FUNCTION, *faults)
+        yield judged(title, "a freshly written file", (OTHER_FUNCTION,), ())
+        return
+    faults = tuple(_faults(nearest.lines, lines))
     why = _why_not(nearest, form)
     results: list[Comparison] = []
     if not faults or program.may_run:

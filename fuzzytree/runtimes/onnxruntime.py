@@ -549,19 +549,10 @@ def _part_faults(message: Any) -> Iterator[str]:
         elif field.message_type is not None:
             for part in values:
                 yield from _part_faults(part)
-        elif (
-            field.cpp_type == field.CPPTYPE_STRING
-            and field.name != "raw_data"
-            and not all(map(_is_text, values))
-        ):
-            yield f"its {kind} has a {field.name!r} that is no UTF-8"
-
-
-def _is_text(value: str | bytes) -> bool:
-    try:
-        return isinstance(value, str) or value.decode() is not None
-    except UnicodeDecodeError:
-        return False
+        elif field.cpp_type == field.CPPTYPE_STRING and field.name != "raw_data":
+            texts = (text for text in values if isinstance(text, bytes))
+            if any(text != text.decode(errors="ignore").encode() for text in texts):
+                yield f"its {kind} has a {field.name!r} that is no UTF-8"
 
 
 def _operator_faults(proto: onnx.ModelProto) -> Iterator[str]:

@@ -133,6 +133,7 @@ def test_raw_rules_of_a_tree_are_a_difference_unless_wanted(path: str) -> None:
         "it holds raw rules, another function than the tree; --terms raw compares it "
         "with the tree's own raw rules",
     )
+    assert not checked(TREE, path, run_code=True, rows_only=True).ok
     assert checked(TREE, path, terms="raw").ok
 
 
