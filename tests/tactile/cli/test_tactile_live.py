@@ -153,10 +153,10 @@ def test_a_full_disk_ends_the_recording_and_recognition_goes_on(
 
 
 def test_a_recording_that_is_there_is_not_written_over(call: Call) -> None:
-    before = Path("some.ftr").read_bytes()
-    code, _, err = call(*REPLAY, "--record", "some.ftr")
-    assert (code, err) == (2, "some.ftr: is there already\n")
-    assert Path("some.ftr").read_bytes() == before
+    Path("other.ftr").write_bytes(b"another recording")
+    code, _, err = call(*REPLAY, "--record", "other.ftr")
+    assert (code, err) == (2, "other.ftr: is there already\n")
+    assert Path("other.ftr").read_bytes() == b"another recording"
 
 
 def test_what_is_far_from_all_that_was_learnt_is_unknown_unless_one_requests(
