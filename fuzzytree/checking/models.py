@@ -87,7 +87,8 @@ class CheckedModel:
     def __init__(
         self, model: Model, data: FloatArray | None, limit: int, terms: Kind
     ) -> None:
-        self.model, self.terms, self.tolerance = model, terms, TOLERANCE
+        self.model, self.tolerance = model, TOLERANCE
+        self.terms: Kind = terms
         self.rows = probed(model, data, limit)
         native = baseline().load
         self.forms = {str(title): form for title, form in forms(model).items()}

@@ -258,11 +258,11 @@ def _norms(
     block: FclBlock, rules: Sequence[SystemRule], scope: Scope
 ) -> tuple[TNorm | None, SNorm | None]:
     """Return AND and OR; one that is missing and needed comes with the other one."""
-    conjunction = norm_of(block, "AND", FCL_TNORMS, scope.notes)
-    disjunction = norm_of(block, "OR", FCL_SNORMS, scope.notes)
+    conjunction: TNorm | None = norm_of(block, "AND", FCL_TNORMS, scope.notes)
+    disjunction: SNorm | None = norm_of(block, "OR", FCL_SNORMS, scope.notes)
     is_jfuzzylogic = scope.dialect == "jfuzzylogic"
     pairs = JFUZZYLOGIC_PAIRS if is_jfuzzylogic else PAIRS
-    partners = {norm: conjunction for conjunction, norm in pairs.items()}
+    partners: dict[SNorm, TNorm] = {s: t for t, s in pairs.items()}
     if conjunction and disjunction and pairs[conjunction] != disjunction:
         if is_jfuzzylogic:
             first, second = (place(block.words(word)[0]) for word in ("AND", "OR"))

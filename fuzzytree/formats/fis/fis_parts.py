@@ -292,8 +292,8 @@ def _label(
     if result != written.name:
         what = f"term {entry.key} of {about[0]!r} is called {written.name!r}"
         notes.remark(f"{what}; here it is {result!r}")
-    curve = _curve(written, entry, about, notes)
-    return Term(result, *(curve or (_WRONG,)))
+    function, height = _curve(written, entry, about, notes) or (_WRONG, 1.0)
+    return Term(result, function, height)
 
 
 def _curve(
