@@ -6,32 +6,25 @@ Several propositions on one input become one term of that input
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import msgspec
 
 from fuzzytree.errors import LossError
 from fuzzytree.formats import CONCLUDING_HEDGES, FIS_HEDGES, Dialect
 from fuzzytree.model import (
-    And,
     Condition,
     FuzzySystem,
     Hedge,
     Loss,
     Not,
     Or,
-    Points,
     Proposition,
     RuleBlock,
     SystemOutput,
     SystemRule,
-    Term,
-    combined,
-    condition_text,
-    questions,
-    unlike,
 )
-from fuzzytree.semantics import EVERYWHERE, joint_points, operands, split
+from fuzzytree.semantics import EVERYWHERE, JointTerms, operands, split
 
 
 class FisRule(msgspec.Struct, frozen=True):
@@ -43,16 +36,12 @@ class FisRule(msgspec.Struct, frozen=True):
     is_or: bool = False
 
 
-class FisTerms:
+class FisTerms(JointTerms):
     """The terms of all inputs; terms that a rule needs are added."""
 
     def __init__(self, system: FuzzySystem, dialect: Dialect, tolerance: float) -> None:
-        self.system, self.tolerance = system, tolerance
+        super().__init__(system, tolerance)
         self.dialect: Dialect = dialect
-        self.inputs = {one.name: one for one in system.variables}
-        self.labels = {one.name: [*one.terms] for one in system.variables}
-        self.losses: list[Loss] = []
-        self._made: dict[Condition, tuple[str, str]] = {}
 
     def place(self, variable: str, label: str) -> int:
         """Return the number of a term, from 1."""
@@ -61,22 +50,14 @@ class FisTerms:
 
     def everywhere(self) -> dict[str, str]:
         """Return a condition that is always true."""
-        if not self.inputs:
+        if not self.labels:
             raise LossError(
                 "it has no condition, and there is no input that it could test"
             )
-        first = next(iter(self.inputs))
+        first = next(iter(self.labels))
         if self.dialect == "fuzzylite":
             return {first: "0.99"}
-        return {first: str(self._added(first, "always", EVERYWHERE))}
-
-    def _added(self, variable: str, name: str, curve: Points) -> int:
-        labels = self.labels[variable]
-        for number, label in enumerate(labels, 1):
-            if label.function == curve and label.height == 1.0:
-                return number
-        labels.append(Term(unlike(name, [one.name for one in labels]), curve))
-        return len(labels)
+        return {first: str(self.place(first, self.add(first, "always", EVERYWHERE)))}
 
     def code(self, proposition: Proposition) -> str | None:
         """Return the number of a proposition with its hedges; None if it has none."""
@@ -91,28 +72,6 @@ class FisTerms:
             self.place(proposition.variable, proposition.term or "") if has_label else 0
         )
         return _code(place, hundredths, is_negated=is_negated)
-
-    def joined(self, parts: Sequence[Condition], *, is_or: bool) -> str:
-        """Return the number of a term for several propositions on one input."""
-        whole = combined(Or if is_or else And, parts)
-        if whole in self._made:
-            return str(self.place(*self._made[whole]))
-        variable = next(questions(whole)).variable
-        try:
-            block = self.system.blocks[0]
-            points, bound = joint_points(whole, self.labels, block, self.tolerance)
-        except LossError as error:
-            raise LossError(
-                f"{variable!r} has several conditions, and {error}"
-            ) from error
-        number = self._added(variable, _text_of(whole)[:60], points)
-        label = self.labels[variable][number - 1].name
-        self._made[whole] = (variable, label)
-        what = f"the rules test it jointly; the term {label!r} stands for that"
-        self.losses.append(
-            Loss(f"{_text_of(whole)} of {variable!r}"[:200], what, bound)
-        )
-        return str(number)
 
 
 def lines_of(
@@ -155,7 +114,6 @@ def _codes(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
     if condition is None:
         return {} if terms.dialect == "matlab" else terms.everywhere()
     is_or = isinstance(condition, Or)
-    groups: dict[str, list[Condition]] = {}
     parts = [_simple(one) for one in operands(condition, terms.system.blocks[0])]
     if terms.dialect != "fuzzylite":
         plain = [
@@ -166,23 +124,13 @@ def _codes(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
         if not plain or (is_or and len(plain) < len(parts)):
             return _codes(None, terms)
         parts = plain
-    for part in parts:
-        names = {proposition.variable for proposition in questions(part)}
-        if len(names) > 1:
-            raise LossError("it mixes and, or and not over several inputs")
-        (name,) = names
-        if name not in terms.inputs:
-            raise LossError(f"it tests the output {name!r}")
-        groups.setdefault(name, []).append(part)
     codes: dict[str, str] = {}
-    for name, parts in groups.items():
-        code = None
-        if len(parts) == 1 and isinstance(parts[0], Proposition):
-            code = terms.code(parts[0])
-            if code is None:
-                hedges = " ".join(parts[0].hedges)
-                raise LossError(f"{terms.dialect} has no way to say {hedges!r}")
-        codes[name] = code or terms.joined(parts, is_or=is_or)
+    for name, proposition in terms.by_input(parts, is_or=is_or).items():
+        code = terms.code(proposition)
+        if code is None:
+            hedges = " ".join(proposition.hedges)
+            raise LossError(f"{terms.dialect} has no way to say {hedges!r}")
+        codes[name] = code
     return {name: code for name, code in codes.items() if code != "0"}
 
 
@@ -241,7 +189,3 @@ def _hundredths(
 ) -> int | None:
     known = {hedge: code for code, hedge in reversed([*table.items()])}
     return known.get(hedges)
-
-
-def _text_of(condition: Condition) -> str:
-    return condition_text(condition, lambda one: " ".join((*one.hedges, *one.terms)))

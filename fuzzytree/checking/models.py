@@ -43,7 +43,6 @@ from fuzzytree.model import (
     kind_of,
 )
 from fuzzytree.numerics import (
-    ApproximateRules,
     by_points,
     decide,
     open_paths,
@@ -301,11 +300,9 @@ def _shipped(
             return
     actual = ModelRun(title, other, baseline().load(other)(rows.values))
     base = native_base(expected or model, "float64", rows)
-    near = _near(base.model, other, tolerance)
-    if near is not None:
-        against = f"the model within {short_above(near.bound)}: curves became points"
-        yield counted("file", title, against, 1, ())
-        yield _within(actual, base, rows, near)
+    near = [*_near(title, actual, base, rows, tolerance)]
+    if near:
+        yield from near
         return
     is_like = expected is not None and other.classes == model.classes
     answers = (compare_bits if is_like else compare_answers)(actual, base, rows)
@@ -316,26 +313,23 @@ def _shipped(
     yield answers
 
 
-def _near(model: Model, other: Model, tolerance: float) -> ApproximateRules | None:
-    """Return rules with points for their curves, if a file holds these very rules."""
+def _near(
+    title: str, actual: ModelRun, base: ModelRun, rows: RowSet, tolerance: float
+) -> Iterator[Comparison]:
+    """Compare rules that have points for the curves of others, within their bound."""
+    model, other = base.model, actual.model
     if not (isinstance(model, RuleBase) and isinstance(other, RuleBase)):
-        return None
+        return
     try:
         near = by_points(model, tolerance)
     except LossError:
-        return None
-    return near if near.terms and near.model == other else None
-
-
-def _within(
-    actual: ModelRun, base: ModelRun, rows: RowSet, near: ApproximateRules
-) -> Comparison:
-    """Compare strengths within the bound of points, and what rounding adds to it."""
-    allowed = np.full(rows.numbers.shape, near.bound)
-    for run in (actual, base):
-        if isinstance(run.model, RuleBase):
-            allowed += strength_bounds(run.model, "float64", rows.values)[0]
-    return compare_within(actual, base, rows, allowed=allowed, origin=near.origin)
+        return
+    if near.terms and near.model == other:
+        against = f"the model within {short_above(near.bound)}: curves became points"
+        yield counted("file", title, against, 1, ())
+        allowed = near.bound + strength_bounds(model, "float64", rows.values)[0]
+        allowed += strength_bounds(other, "float64", rows.values)[0]
+        yield compare_within(actual, base, rows, allowed=allowed, origin=near.origin)
 
 
 def _as_rules(tree: FuzzyTree, model: RuleBase) -> RuleBase | None:

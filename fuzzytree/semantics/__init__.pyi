@@ -5,7 +5,7 @@ from .conversion.facts import facts_of as facts_of
 from .conversion.facts import numbers_of as numbers_of
 from .conversion.facts import places_of as places_of
 from .conversion.joint_terms import EVERYWHERE as EVERYWHERE
-from .conversion.joint_terms import joint_points as joint_points
+from .conversion.joint_terms import JointTerms as JointTerms
 from .conversion.joint_terms import operands as operands
 from .conversion.points import band_of as band_of
 from .conversion.points import check_tolerance as check_tolerance

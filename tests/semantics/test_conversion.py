@@ -542,6 +542,6 @@ def test_joint_terms_of_very_many_points_are_not_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     content = export(twice("minimum"), "fis", allow_loss=True).content
-    monkeypatch.setattr("fuzzytree.semantics.conversion.joint_terms._MOST", 8)
+    monkeypatch.setattr("fuzzytree.semantics.conversion.joint_terms.MOST_JOINT", 8)
     again = read_content(content, find_format("fis"), name="m").model
     assert isinstance(again, FuzzySystem)

@@ -6,8 +6,8 @@ rounding, or their product within a tolerance.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable
 
 from msgspec.structs import replace
 
@@ -18,20 +18,24 @@ from fuzzytree.model import (
     And,
     Condition,
     FuzzySystem,
+    Loss,
     Not,
     Or,
     Points,
     Proposition,
     RuleBlock,
+    SystemRule,
     Term,
     combined,
+    condition_text,
     questions,
     unlike,
 )
 from fuzzytree.numerics import Lines
 from fuzzytree.semantics.conversion.points import shape_of
 
-_MOST = 1 << 16  # points of all joint terms, so that a file is read in seconds
+MOST_JOINT = 1 << 16
+"""Points of all joint terms of a file that is read, so that it takes seconds."""
 
 EVERYWHERE = Points((0.0,), (1.0,))
 """Degree 1 at every value."""
@@ -50,127 +54,152 @@ def operands(condition: Condition, block: RuleBlock) -> list[Condition]:
     return parts
 
 
+class JointTerms:
+    """The terms of all inputs; those that rules need for joint conditions are added.
+
+    Attributes:
+        labels: The terms of each input.
+        losses: A loss for each joint term, with its bound.
+    """
+
+    def __init__(
+        self,
+        system: FuzzySystem,
+        tolerance: float = TOLERANCE,
+        *,
+        room: float = math.inf,
+    ) -> None:
+        self.system, self.tolerance, self.room = system, tolerance, room
+        self.labels = {one.name: [*one.terms] for one in system.variables}
+        self.losses: list[Loss] = []
+        self._names: dict[Condition, str] = {}
+
+    def by_input(
+        self, parts: Iterable[Condition], *, is_or: bool
+    ) -> dict[str, Proposition]:
+        """Return one proposition for each input that conditions test.
+
+        Raises:
+            LossError: If one tests several inputs or an output, or if what tests one
+                input has no lines, or there are more points than room.
+        """
+        groups: dict[str, list[Condition]] = {name: [] for name in self.labels}
+        for part in parts:
+            names = {proposition.variable for proposition in questions(part)}
+            if len(names) > 1:
+                raise LossError("it mixes and, or and not over several inputs")
+            (name,) = names
+            if name not in groups:
+                raise LossError(f"it tests the output {name!r}")
+            groups[name].append(part)
+        results: dict[str, Proposition] = {}
+        for name, own in groups.items():
+            if len(own) == 1 and isinstance(own[0], Proposition):
+                results[name] = own[0]
+            elif own:
+                label = self._joint(name, combined(Or if is_or else And, own))
+                results[name] = Proposition(name, (label,))
+        return results
+
+    def add(self, variable: str, name: str, points: Points) -> str:
+        """Return the name of a term with some points; it is added if there is none."""
+        labels = self.labels[variable]
+        for label in labels:
+            if label.function == points and label.height == 1.0:
+                return label.name
+        labels.append(Term(unlike(name, [one.name for one in labels]), points))
+        return labels[-1].name
+
+    def _joint(self, variable: str, condition: Condition) -> str:
+        if condition in self._names:
+            return self._names[condition]
+        try:
+            lines, bound = self._lines(condition)
+            points, rounding = numerics.rounded_lines(lines)
+            self.room -= len(points.values)
+            if self.room < 0:
+                raise LossError("they have too many points")
+        except LossError as error:
+            text = f"{variable!r} has several conditions, and {error}"
+            raise LossError(text) from error
+        text = condition_text(
+            condition, lambda one: " ".join((*one.hedges, *one.terms))
+        )
+        label = self.add(variable, text[:60], points)
+        self._names[condition] = label
+        what = f"the rules test it jointly; the term {label!r} stands for that"
+        where = f"{text} of {variable!r}"[:200]
+        self.losses.append(Loss(where, what, bound + rounding))
+        return label
+
+    def _lines(self, condition: Condition) -> tuple[Lines, float]:
+        """Return the degree of a condition on one input as lines, and their error."""
+        match condition:
+            case Proposition():
+                return self._lines_of(condition), 0.0
+            case Not(part=part):
+                lines, bound = self._lines(part)
+                return numerics.negated(lines), bound
+            case And(parts=parts) | Or(parts=parts):
+                result = [self._lines(part) for part in parts]
+                total, bound = result[0]
+                join = self._join(is_or=isinstance(condition, Or))
+                for lines, error in result[1:]:
+                    total, more = join(total, lines)
+                    # Errors of a product add; least and greatest pass one on.
+                    bound = bound + error + more
+                return total, bound
+
+    def _lines_of(self, proposition: Proposition) -> Lines:
+        variable, hedges = proposition.variable, proposition.hedges
+        if hedges[:1] == ("any",):
+            return numerics.lines_of(EVERYWHERE)
+        if proposition.term is None or hedges not in ((), ("not",)):
+            raise LossError(f"{variable!r} has several conditions with hedges")
+        labels = self.labels[variable]
+        label = next(one for one in labels if one.name == proposition.term)
+        shape = shape_of(label.function)
+        if not isinstance(shape, Points):
+            text = f"the term {proposition.term!r} of {variable!r}"
+            raise LossError(f"{text} has several conditions and is no list of points")
+        lines = numerics.scaled(numerics.lines_of(shape), label.height)
+        return numerics.negated(lines) if hedges else lines
+
+    def _join(self, *, is_or: bool) -> Callable[[Lines, Lines], tuple[Lines, float]]:
+        block = self.system.blocks[0]
+        match norm := block.disjunction if is_or else block.conjunction:
+            case "minimum":
+                return lambda one, other: (numerics.least(one, other), 0.0)
+            case "maximum":
+                return lambda one, other: (numerics.greatest(one, other), 0.0)
+            case "product":
+                return lambda one, other: numerics.product(one, other, self.tolerance)
+            case _:
+                raise LossError(f"one input has several conditions, joined by {norm}")
+
+
+def _text_of(proposition: Proposition) -> str:
+    return " ".join((*proposition.hedges, *proposition.terms))
+
+
 def with_joint_terms(system: FuzzySystem) -> FuzzySystem:
     """Return a system whose rules test each input once, in the order of the inputs.
 
     Raises:
-        LossError: As `joint_points`, or if the joint terms have too many points.
+        LossError: As `JointTerms.by_input`.
     """
-    labels = {one.name: [*one.terms] for one in system.variables}
-    joint_labels: dict[Condition, str] = {}
-    size = 0
+    terms = JointTerms(system, room=MOST_JOINT)
 
-    def joint(when: Condition | None, block: RuleBlock) -> Condition | None:
-        nonlocal size
-        if when is None:
-            return None
-        kind = Or if isinstance(when, Or) else And
-        groups: dict[str, list[Condition]] = {name: [] for name in labels}
-        for part in operands(when, block):
-            groups[next(questions(part)).variable].append(part)
-        for name, parts in groups.items():
-            if len(parts) > 1 or any(not isinstance(p, Proposition) for p in parts):
-                whole = combined(kind, parts)
-                if whole not in joint_labels:
-                    points, _ = joint_points(whole, labels, block)
-                    joint_labels[whole] = _label_of(labels[name], points)
-                    size += len(points.values)
-                    if size > _MOST:
-                        raise LossError(f"joint terms have more than {_MOST} points")
-                groups[name] = [Proposition(name, (joint_labels[whole],))]
-        return combined(kind, itertools.chain.from_iterable(groups.values()))
+    def joint(rule: SystemRule, block: RuleBlock) -> SystemRule:
+        if rule.when is None:
+            return rule
+        is_or = isinstance(rule.when, Or)
+        parts = terms.by_input(operands(rule.when, block), is_or=is_or).values()
+        return replace(rule, when=combined(Or if is_or else And, parts))
 
     blocks = tuple(
-        replace(
-            block,
-            rules=tuple(replace(r, when=joint(r.when, block)) for r in block.rules),
-        )
+        replace(block, rules=tuple(joint(rule, block) for rule in block.rules))
         for block in system.blocks
     )
-    inputs = (replace(v, terms=tuple(labels[v.name])) for v in system.variables)
+    inputs = (replace(v, terms=tuple(terms.labels[v.name])) for v in system.variables)
     return replace(system, variables=tuple(inputs), blocks=blocks)
-
-
-def _label_of(labels: list[Term], points: Points) -> str:
-    """Return the name of the term with some points, which is added if there is none."""
-    for label in labels:
-        if label.function == points and label.height == 1.0:
-            return label.name
-    labels.append(Term(unlike("joint", [one.name for one in labels]), points))
-    return labels[-1].name
-
-
-def joint_points(
-    condition: Condition,
-    labels: Mapping[str, Sequence[Term]],
-    block: RuleBlock,
-    tolerance: float = TOLERANCE,
-) -> tuple[Points, float]:
-    """Return the points of a condition on one input, and how far they can be off.
-
-    Args:
-        condition: What tests the input.
-        labels: The terms of each input.
-        block: The rules' norms.
-        tolerance: The largest error of a product.
-
-    Raises:
-        LossError: If a term is no list of points, or a hedge or norm has no lines.
-    """
-    lines, bound = _lines(condition, labels, block, tolerance)
-    points, rounding = numerics.rounded_lines(lines)
-    return points, bound + rounding
-
-
-def _lines(
-    condition: Condition,
-    labels: Mapping[str, Sequence[Term]],
-    block: RuleBlock,
-    tolerance: float,
-) -> tuple[Lines, float]:
-    """Return the degree of a condition on one input as lines, and their error."""
-    match condition:
-        case Proposition():
-            return _lines_of(condition, labels), 0.0
-        case Not(part=part):
-            lines, bound = _lines(part, labels, block, tolerance)
-            return numerics.negated(lines), bound
-        case And(parts=parts) | Or(parts=parts):
-            result = [_lines(part, labels, block, tolerance) for part in parts]
-            total, bound = result[0]
-            is_or = isinstance(condition, Or)
-            join = _join(block.disjunction if is_or else block.conjunction, tolerance)
-            for lines, error in result[1:]:
-                total, more = join(total, lines)
-                # Errors of a product add; least and greatest pass one on.
-                bound = bound + error + more
-            return total, bound
-
-
-def _lines_of(proposition: Proposition, labels: Mapping[str, Sequence[Term]]) -> Lines:
-    variable, hedges = proposition.variable, proposition.hedges
-    if hedges[:1] == ("any",):
-        return numerics.lines_of(EVERYWHERE)
-    if proposition.term is None or hedges not in ((), ("not",)):
-        raise LossError(f"{variable!r} has several conditions with hedges")
-    label = next(one for one in labels[variable] if one.name == proposition.term)
-    shape = shape_of(label.function)
-    if not isinstance(shape, Points):
-        text = f"the term {proposition.term!r} of {variable!r}"
-        raise LossError(f"{text} has several conditions and is no list of points")
-    lines = numerics.scaled(numerics.lines_of(shape), label.height)
-    return numerics.negated(lines) if hedges else lines
-
-
-def _join(
-    norm: str | None, tolerance: float
-) -> Callable[[Lines, Lines], tuple[Lines, float]]:
-    match norm:
-        case "minimum":
-            return lambda one, other: (numerics.least(one, other), 0.0)
-        case "maximum":
-            return lambda one, other: (numerics.greatest(one, other), 0.0)
-        case "product":
-            return lambda one, other: numerics.product(one, other, tolerance)
-        case _:
-            raise LossError(f"one input has several conditions, joined by {norm}")
