@@ -139,9 +139,9 @@ def write(
         losses += private
     elif private and dialect != "fuzzylite":
         remarks.append(
-            f"{private[0].where}: {private[0].what}; in all {len(private)} of the "
-            "terms need a function that docs/reference/fis.md shows, and "
-            "--set curves=standard counts them as losses"
+            f"{private[0].where}: {private[0].what}; terms that need a function of "
+            f"docs/reference/fis.md: {len(private)}; --set curves=standard counts them "
+            "as losses"
         )
     if losses and not allow_loss:
         raise refusal(model.name, "fis", losses)

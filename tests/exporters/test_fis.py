@@ -313,8 +313,8 @@ def test_a_curve_that_octave_lacks_is_remarked() -> None:
     written = write(replace(system, variables=(first, second)))
     assert (
         "term 'low' of 'a': it is a discretemf, which MATLAB and Octave do not "
-        "have; in all 1 of the terms need a function that docs/reference/fis.md shows, "
-        "and --set curves=standard counts them as losses"
+        "have; terms that need a function of docs/reference/fis.md: 1; "
+        "--set curves=standard counts them as losses"
     ) in written.remarks
     assert not any(
         "discretemf" in remark
