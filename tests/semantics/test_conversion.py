@@ -545,3 +545,17 @@ def test_joint_terms_of_very_many_points_are_not_read(
     monkeypatch.setattr("fuzzytree.semantics.conversion.joint_terms.MOST_JOINT", 8)
     again = read_content(content, find_format("fis"), name="m").model
     assert isinstance(again, FuzzySystem)
+
+
+@pytest.mark.parametrize("suffix", [".fcl", ".fll", ".fis", ".fml"])
+def test_the_flanks_of_a_system_come_back_from_a_file(suffix: str) -> None:
+    shapes = [band for band in BANDS if band.flanks]
+    terms = tuple(Term(f"t{k}", shape) for k, shape in enumerate(shapes))
+    rules = tuple(Rule((Proposition("x", (t.name,)),), "a") for t in terms)
+    base = RuleBase("m", ("a",), (Variable("x", terms),), rules)
+    system = as_system(base, always="term")
+    content = export(system, suffix, allow_loss=True).content
+    again = read_content(content, find_format(suffix), name="m").model
+    assert isinstance(again, FuzzySystem)
+    read = [term.function for term in again.variables[0].terms]
+    assert read[: len(shapes)] == shapes

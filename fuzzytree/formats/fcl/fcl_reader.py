@@ -67,7 +67,7 @@ from fuzzytree.model import (
     Variable,
     name_choice,
 )
-from fuzzytree.semantics import as_rules, joined_by_number
+from fuzzytree.semantics import as_rules, flanked, joined_by_number
 
 FACTS = " facts "
 """How the comment begins that says what rules have no place for in a system."""
@@ -155,13 +155,13 @@ def _model(
         if line[:2] in ("//", "(*") and line[2:].startswith(FACTS):
             facts = line[2:].removeprefix(FACTS).removesuffix("*)").strip()
     if not facts:
-        return without_questions(system), None
+        return flanked(without_questions(system)), None
     rules = as_rules(system, facts)
     if rules is not None:
         return rules, facts
     text = "the facts in a comment belong to other rules; the file is read as a system"
     notes.remark(text)
-    return system, None
+    return flanked(system), None
 
 
 def _rule_blocks(blocks: Sequence[FclBlock], scope: Scope) -> list[FclRuleBlock]:

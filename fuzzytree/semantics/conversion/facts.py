@@ -37,6 +37,7 @@ from fuzzytree.model import (
     Variable,
     questions,
 )
+from fuzzytree.numerics import BELOW_ONE
 from fuzzytree.semantics.conversion.joint_terms import with_joint_terms
 from fuzzytree.semantics.conversion.points import band_of, shape_of, stepped
 from fuzzytree.semantics.conversion.scores import Always, Scores, as_system, flattened
@@ -231,6 +232,21 @@ def _with_bands(rules: RuleBase, facts: _Facts) -> RuleBase:
     return replace(rules, variables=variables)
 
 
+def flanked(system: FuzzySystem) -> FuzzySystem:
+    """Return a system whose inputs have bands for points that only a flank has."""
+
+    def original(term: Term) -> Term:
+        if isinstance(points := term.function, Points) and BELOW_ONE in points.degrees:
+            band = band_of(Points(stepped(points.values), points.degrees))
+            return replace(term, function=band or points)
+        return term
+
+    variables = (
+        replace(one, terms=tuple(map(original, one.terms))) for one in system.variables
+    )
+    return replace(system, variables=tuple(variables))
+
+
 def as_written(
     system: FuzzySystem, comments: Iterable[str], *, by_input: bool = False
 ) -> tuple[RuleBase | FuzzySystem, str | None]:
@@ -253,7 +269,7 @@ def as_written(
         (one.removeprefix(FACTS) for one in every if one.startswith(FACTS)), None
     )
     rules = None if facts is None else as_rules(system, facts, by_input=by_input)
-    return (system, None) if rules is None else (rules, facts)
+    return (flanked(system), None) if rules is None else (rules, facts)
 
 
 def numbers_of(facts: str) -> tuple[int, ...]:
