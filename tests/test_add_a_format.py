@@ -35,6 +35,7 @@ def _run(*words: str, folder: Path, path: Path) -> subprocess.CompletedProcess[s
     )  # fmt: skip
 
 
+@pytest.mark.heavy
 def test_a_format_is_added_to_this_repository(tmp_path: Path) -> None:
     copy = tmp_path / "copy"
     ignored = shutil.ignore_patterns("__pycache__")

@@ -69,6 +69,7 @@ def test_parts_give_the_supports_and_the_confusion_of_all_rows(
     assert merged.rows == ROWS
 
 
+@pytest.mark.heavy
 def test_supports_that_are_exact_already_stay(table: pd.DataFrame) -> None:
     tree = ft.learn(table, target="kind")
     assert fingerprint(counts_of(tree, table).learn()) == fingerprint(tree)

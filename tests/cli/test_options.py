@@ -34,6 +34,7 @@ SAME = {
     "--target": "the column of the classes",
     "--terms": "the kind of rules of a tree: those that equal it, or the paper's",
     "--to": "the format to write",
+    "--tolerance": "the largest error of a degree where points stand for a curve",
     "--unit": "a unit; `learn` takes several, by column",
 }
 """Options whose help differs between verbs, and what they mean in all of them."""

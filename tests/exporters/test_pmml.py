@@ -235,6 +235,7 @@ def test_rules_have_the_references_bits(seed: int, kind: Kind) -> None:
     assert_alike(with_points(rules, seed))
 
 
+@pytest.mark.heavy
 def test_rules_written_as_points_are_as_near_as_they_say() -> None:
     rules = rules_from_tree(random_tree(2), "raw")
     options: dict[str, Any] = {"curves": "points", "tolerance": 1e-2}

@@ -242,9 +242,9 @@ def test_a_file_that_is_cut_or_changed_is_refused(tmp_path: Path) -> None:
     whole.save(path)
     content = path.read_bytes()
     random = np.random.default_rng(0)
-    cuts = [content[:size] for size in random.integers(0, len(content), 20)]
+    cuts = [content[:size] for size in random.integers(0, len(content), 10)]
     changed: list[bytes] = []
-    for place in random.integers(0, len(content), 80).tolist():
+    for place in random.integers(0, len(content), 25).tolist():
         new = bytes([content[place] ^ int(random.integers(1, 256))])
         changed.append(content[:place] + new + content[place + 1 :])
     messages: list[str] = []
@@ -256,7 +256,7 @@ def test_a_file_that_is_cut_or_changed_is_refused(tmp_path: Path) -> None:
             messages.append(str(error))
         else:  # padding, which means nothing
             assert fingerprint(loaded.learn()) == fingerprint(whole.learn())
-    assert len(messages) > 80
+    assert len(messages) > 30
     assert all(one.startswith(f"{path}: ") and "\n" not in one for one in messages)
 
 

@@ -175,6 +175,7 @@ def test_a_pause_lasts_as_long_in_a_video(tmp_path: Path) -> None:
         assert away < LOST / 4
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("shape", [(1, 1), (1, 256), (5, 24), (256, 256)])
 @pytest.mark.parametrize("times", [[3.0], [1.0, 0.5], [0.0, 0.0, 100.0]])
 def test_pictures_of_any_size_and_times_are_written(

@@ -179,6 +179,7 @@ def test_a_point_is_a_domain_too() -> None:
     assert isinstance(wins(given, 3, (1, 2)), Proved)
 
 
+@pytest.mark.heavy
 def test_a_spent_budget_leaves_a_bracket() -> None:
     rules = random_base(0, 7, 4)
     ticks = iter(range(10**6))
