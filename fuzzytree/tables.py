@@ -1015,7 +1015,8 @@ def columns_of(
         if others > 0:
             shown[_MOST_NAMES:] = [f"and {counted(others, 'column')} more hold text"]
         hints = (
-            " ".join(f"--{option} {_quoted(k)}" for k in _some(mixed))
+            " ".join(f"--{option} {_quoted(k)}" for k in [*mixed][:2])
+            + (" ..." if len(mixed) > 2 else "")
             for option in ("ignore", "categorical")
         )
         text = "leave columns out with ignore ({}), or take all their cells as "
