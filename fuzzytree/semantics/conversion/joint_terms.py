@@ -178,10 +178,6 @@ class JointTerms:
                 raise LossError(f"one input has several conditions, joined by {norm}")
 
 
-def _text_of(proposition: Proposition) -> str:
-    return " ".join((*proposition.hedges, *proposition.terms))
-
-
 def with_joint_terms(system: FuzzySystem) -> FuzzySystem:
     """Return a system whose rules test each input once, in the order of the inputs.
 
