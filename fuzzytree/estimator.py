@@ -108,11 +108,11 @@ def _with_hints(construct: Callable[P, None]) -> Callable[P, None]:
     names = [*inspect.signature(construct).parameters][1:]
 
     @functools.wraps(construct)
-    def checked(*args: P.args, **settings: P.kwargs) -> None:
+    def check_names(*args: P.args, **settings: P.kwargs) -> None:
         refuse_unknown("FuzzyTreeClassifier", settings, names)
         construct(*args, **settings)
 
-    return checked
+    return check_names
 
 
 def _sound_labels(y: Any) -> Any:
@@ -274,7 +274,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             values, labels = _validated(self, *rows, **self._numeric())
         else:
             _validated(self, *rows, skip_check_array=True)
-            table, categories, dates = _as_numbers(self._renamed(frame))
+            table, categories, dates = _as_numbers(self._with_own_names(frame))
             values, labels = check_X_y(table, rows[1], **self._numeric())
         check_classification_targets(labels)
         if len(values) == 1:
@@ -544,7 +544,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             return [f"x{number}" for number in range(1, self.n_features_in_ + 1)]
         return [str(name) for name in names]
 
-    def _renamed(self, frame: nw.DataFrame[Any]) -> nw.DataFrame[Any]:
+    def _with_own_names(self, frame: nw.DataFrame[Any]) -> nw.DataFrame[Any]:
         """Return a frame whose columns have the names of the tree's."""
         return frame.rename(dict(zip(frame.columns, self._columns(), strict=True)))
 
@@ -556,7 +556,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             rows: Any = _validated(self, X, reset=False, **self._numeric())
         else:
             _validated(self, X, reset=False, skip_check_array=True)
-            rows = self._renamed(frame).to_native()
+            rows = self._with_own_names(frame).to_native()
         table, variables = TableSource(rows, self._columns()), self.tree_.variables
         [part] = batches(table, self.tree_.inputs, variables=variables, name="X")
         if frame is not None:

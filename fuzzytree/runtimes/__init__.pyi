@@ -6,8 +6,8 @@ from .one_row import load as load
 from .one_row import row_runner as row_runner
 from .onnxruntime import Facts as Facts
 from .onnxruntime import OnnxModel as OnnxModel
-from .onnxruntime import loaded as loaded
 from .onnxruntime import open_onnx as open_onnx
+from .onnxruntime import open_session as open_session
 from .onnxruntime import parsed as parsed
 from .onnxruntime import texts_of as texts_of
 from .predictions import By as By

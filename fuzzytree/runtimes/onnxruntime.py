@@ -169,7 +169,7 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
     facts = _facts(proto, name)
     _check_signature(proto, facts, name)
 
-    bare = loaded(proto, name, _rows_at_once(facts))
+    bare = open_session(proto, name, _rows_at_once(facts))
     is_system, has_labels = facts.representation == "system", "label" in facts.outputs
     refuse = functools.partial(_refuse, facts.name)
     return OnnxModel(
@@ -429,7 +429,7 @@ def parsed(content: bytes, name: str) -> onnx.ModelProto:
     return proto
 
 
-def loaded(proto: onnx.ModelProto, name: str, rows: int) -> exporters.Bare:
+def open_session(proto: onnx.ModelProto, name: str, rows: int) -> exporters.Bare:
     """Return what runs a parsed file: its parts, written anew, and no other bytes.
 
     Args:

@@ -2,9 +2,9 @@ from .conversion.facts import FACTS as FACTS
 from .conversion.facts import as_rules as as_rules
 from .conversion.facts import as_written as as_written
 from .conversion.facts import facts_of as facts_of
-from .conversion.facts import flanked as flanked
 from .conversion.facts import numbers_of as numbers_of
 from .conversion.facts import places_of as places_of
+from .conversion.facts import with_flanks as with_flanks
 from .conversion.joint_terms import EVERYWHERE as EVERYWHERE
 from .conversion.joint_terms import JointTerms as JointTerms
 from .conversion.joint_terms import operands as operands

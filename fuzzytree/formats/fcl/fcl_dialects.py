@@ -104,7 +104,7 @@ class DialectEvidence(NamedTuple):
     weight: int = 2
 
 
-def detected(text: FclText, wanted: Dialect | None) -> tuple[Dialect, str, bool]:
+def detect_dialect(text: FclText, wanted: Dialect | None) -> tuple[Dialect, str, bool]:
     """Return the dialect of a file, why it is, and whether no other one can be meant.
 
     It is the wanted one, or the one that the words of the file speak for.

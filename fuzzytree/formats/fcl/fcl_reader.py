@@ -24,7 +24,7 @@ from fuzzytree.formats.fcl.fcl_dialects import (
     FCL_METHODS,
     FCL_SNORMS,
     Dialect,
-    detected,
+    detect_dialect,
     is_marked,
     norm_of,
 )
@@ -67,7 +67,7 @@ from fuzzytree.model import (
     Variable,
     name_choice,
 )
-from fuzzytree.semantics import as_rules, flanked, joined_by_number
+from fuzzytree.semantics import as_rules, joined_by_number, with_flanks
 
 FACTS = " facts "
 """How the comment begins that says what rules have no place for in a system."""
@@ -105,7 +105,7 @@ def read_fcl(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     """
     text = parsed(content, name)
     notes = ReaderNotes(list(text.mistakes), remarks=list(text.remarks))
-    dialect, sentence, is_certain = detected(text, dialect)
+    dialect, sentence, is_certain = detect_dialect(text, dialect)
     notes.remark(sentence)
     title, blocks = blocks_of(text, notes)
     known = FclVariables({}, {}, dialect, notes, is_certain)
@@ -155,13 +155,13 @@ def _model(
         if line[:2] in ("//", "(*") and line[2:].startswith(FACTS):
             facts = line[2:].removeprefix(FACTS).removesuffix("*)").strip()
     if not facts:
-        return flanked(without_questions(system)), None
+        return with_flanks(without_questions(system)), None
     rules = as_rules(system, facts)
     if rules is not None:
         return rules, facts
     text = "the facts in a comment belong to other rules; the file is read as a system"
     notes.remark(text)
-    return flanked(system), None
+    return with_flanks(system), None
 
 
 def _rule_blocks(blocks: Sequence[FclBlock], scope: Scope) -> list[FclRuleBlock]:

@@ -93,7 +93,7 @@ def read_fll(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
         raise report(name, notes.mistakes)
     system, positions = parts
     is_own = "Written by fuzzytree." in page.comments
-    system = _joined(system, dialect, notes, is_own=is_own)
+    system = _join_numbers(system, dialect, notes, is_own=is_own)
     model, facts = as_written(system, page.comments)
     return notes.reading(model, locating(positions, facts))
 
@@ -136,7 +136,7 @@ def _system(
     return system, positions
 
 
-def _joined(
+def _join_numbers(
     system: FuzzySystem, dialect: Dialect | None, notes: ReaderNotes, *, is_own: bool
 ) -> FuzzySystem:
     """Return a system whose numbers are joined as in an engine, and note which."""

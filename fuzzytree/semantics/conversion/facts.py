@@ -232,7 +232,7 @@ def _with_bands(rules: RuleBase, facts: _Facts) -> RuleBase:
     return replace(rules, variables=variables)
 
 
-def flanked(system: FuzzySystem) -> FuzzySystem:
+def with_flanks(system: FuzzySystem) -> FuzzySystem:
     """Return a system whose inputs have bands for points that only a flank has."""
 
     def original(term: Term) -> Term:
@@ -269,7 +269,7 @@ def as_written(
         (one.removeprefix(FACTS) for one in every if one.startswith(FACTS)), None
     )
     rules = None if facts is None else as_rules(system, facts, by_input=by_input)
-    return (flanked(system), None) if rules is None else (rules, facts)
+    return (with_flanks(system), None) if rules is None else (rules, facts)
 
 
 def numbers_of(facts: str) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fuzzytree.errors import ReadError, install_hint
 from fuzzytree.model import Model
-from fuzzytree.runtimes import COMPILERS, compiled, loaded, parsed
+from fuzzytree.runtimes import COMPILERS, compiled, open_session, parsed
 from fuzzytree.tactile.exporters.c_frames import write_frames_c
 from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
 from fuzzytree.tactile.features import frame_program
@@ -126,7 +126,7 @@ def _graph(content: bytes, name: str) -> Runner:
     from fuzzytree.exporters import RUNTIME_ERRORS, first_line
 
     proto = parsed(content, name)
-    bare = loaded(proto, name, _FRAMES_AT_ONCE)
+    bare = open_session(proto, name, _FRAMES_AT_ONCE)
     outputs: list[Any] = [entry.name for entry in proto.graph.output]
     is_known = 0 < len(outputs) == len({*outputs} & {*get_args(Output)})
     if not is_known or [entry.name for entry in proto.graph.input] != ["frames"]:
