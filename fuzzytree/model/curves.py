@@ -650,28 +650,12 @@ def _is_false(n: Numbers[N], a: N) -> N:
     return n.equal(a, 0.0)
 
 
-def _is_less(n: Numbers[N], a: N, b: N) -> N:
-    return n.less(a, b)
-
-
-def _is_more(n: Numbers[N], a: N, b: N) -> N:
-    return n.less(b, a)
-
-
 def _is_up_to(n: Numbers[N], a: N, b: N) -> N:
     return n("or", n.at_most(a, b), _is_same(n, a, b))
 
 
-def _is_from(n: Numbers[N], a: N, b: N) -> N:
-    return _is_up_to(n, b, a)
-
-
 def _is_same(n: Numbers[N], a: N, b: N) -> N:
     return n("or", n.equal(a, b), n("and", is_nan(n, a), is_nan(n, b)))
-
-
-def _is_other(n: Numbers[N], a: N, b: N) -> N:
-    return n("not", _is_same(n, a, b))
 
 
 def _modulo(n: Numbers[N], a: N, b: N) -> N:
@@ -702,12 +686,12 @@ _CALLS: Final[Mapping[str, tuple[int, _Meaning]]] = MappingProxyType(
         "^": (2, _same("power")),
         "and": (2, _truth(_both)),
         "or": (2, _truth(_either)),
-        "lt": (2, _truth(_is_less)),
+        "lt": (2, _truth(lambda n, a, b: n.less(a, b))),
         "le": (2, _truth(_is_up_to)),
-        "gt": (2, _truth(_is_more)),
-        "ge": (2, _truth(_is_from)),
+        "gt": (2, _truth(lambda n, a, b: n.less(b, a))),
+        "ge": (2, _truth(lambda n, a, b: _is_up_to(n, b, a))),
         "eq": (2, _truth(_is_same)),
-        "neq": (2, _truth(_is_other)),
+        "neq": (2, _truth(lambda n, a, b: n("not", _is_same(n, a, b)))),
         "min": (2, _same("minimum")),
         "max": (2, _same("maximum")),
         "atan2": (2, _same("arc_tangent_2")),

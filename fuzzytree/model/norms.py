@@ -99,40 +99,15 @@ def _seldom(n: Numbers[N], d: N) -> N:
     return n.where(n.at_most(d, 0.5), n.root(0.5 * d), high)
 
 
-def _any(n: Numbers[N], d: N) -> N:
-    del d
-    return n.constant(1.0)
-
-
-def _not(n: Numbers[N], d: N) -> N:
-    del n
-    return 1.0 - d
-
-
-def _very(n: Numbers[N], d: N) -> N:
-    del n
-    return square(d)
-
-
-def _cubed(n: Numbers[N], d: N) -> N:
-    del n
-    return square(d) * d
-
-
-def _fourth(n: Numbers[N], d: N) -> N:
-    del n
-    return square(square(d))
-
-
 _HEDGES: Mapping[Hedge, _Hedging] = {
-    "any": _any,
-    "not": _not,
-    "very": _very,
+    "any": lambda n, _: n.constant(1.0),
+    "not": lambda _, d: 1.0 - d,
+    "very": lambda _, d: square(d),
     "somewhat": lambda n, d: n.root(d),
     "extremely": _extremely,
     "seldom": _seldom,
-    "cubed": _cubed,
-    "very very": _fourth,
+    "cubed": lambda _, d: square(d) * d,
+    "very very": lambda _, d: square(square(d)),
     "plus": lambda n, d: n.power(d, 1.25),
     "minus": lambda n, d: n.power(d, 0.75),
     "cube root": lambda n, d: n.power(d, 1.0 / 3.0),
