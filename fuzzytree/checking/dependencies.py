@@ -215,7 +215,10 @@ def _explained(title: str, model: Model, whole: Contents) -> Graph:
     ]
     because: list[Because] = []
     left_out: list[str] = []
-    others: dict[str, Model] = {COMBINATIONS: _without_combinations(model)}
+    has_combinations = any(variable.parts for variable in model.variables)
+    others: dict[str, Model] = {
+        COMBINATIONS: free_axes(model) if has_combinations else model
+    }
     if isinstance(model, RuleBase):
         others |= {what: without(model) for what, without in _FEATURES.items()}
     for what, other in others.items():
@@ -237,11 +240,6 @@ def _because(what: str, whole: Contents, without: Contents) -> Because:
     fewer.subtract(without.operators)
     operators = {name: count for name, count in sorted(fewer.items()) if count}
     return Because(what, operators, whole.bytes - without.bytes)
-
-
-def _without_combinations(model: Model) -> Model:
-    has_any = any(variable.parts for variable in model.variables)
-    return free_axes(model) if has_any else model
 
 
 def _with_rules(
@@ -326,7 +324,9 @@ def prove(
     """
     whole, left = forms(model, uses), forms(remainder.model, uses)
     faults = [*proof_faults(model, remainder.model, uses=uses, rules=remainder.rules)]
-    comparisons = [_proof(model, faults)]
+    size = len(model.nodes if isinstance(model, FuzzyTree) else model.rules)
+    proof = counted("proof", "pruned", "the model", size, faults)
+    comparisons = [replace(proof, origin="equal operations on equal numbers")]
     rows = probed(model, data, limit)
     for title, representation in whole.items():
         other = left.get(title)
@@ -339,12 +339,6 @@ def prove(
     return Agreement(
         model.name, fingerprint(model), tuple(comparisons), probes=rows.probes
     )
-
-
-def _proof(model: Model, faults: Sequence[str]) -> Comparison:
-    size = len(model.nodes if isinstance(model, FuzzyTree) else model.rules)
-    proof = counted("proof", "pruned", "the model", size, faults)
-    return replace(proof, origin="equal operations on equal numbers")
 
 
 def _is_seen(model: Model, left: Model, rows: RowSet, dtype: Dtype) -> BoolArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Literal, NamedTuple, get_args
@@ -150,15 +151,9 @@ def _stand_ins(model: Document) -> Iterator[Document]:
     """Yield what a file may hold in the place of a model, deciding alike."""
     yield model
     if isinstance(model, RuleBase):
-        yield from _systems(model)
-
-
-def _systems(rules: RuleBase) -> Iterator[FuzzySystem]:
-    for scores in get_args(Scores):
-        try:
-            yield as_system(rules, scores)
-        except LossError:
-            continue
+        for scores in get_args(Scores):
+            with contextlib.suppress(LossError):
+                yield as_system(model, scores)
 
 
 Names = Mapping[str, str]

@@ -121,7 +121,8 @@ def input_scales(model: Model, values: FloatArray) -> dict[str, InputScale]:
             shapes = [term.shape for term in variable.terms]
             steep = max((_slope(shape) for shape in shapes), default=0.0)
             width = min(map(_width, shapes), default=math.inf)
-            fixed = max((_mixed_cost(shape) for shape in shapes), default=0.0)
+            bounds = (degree_bound(shape, "mixed") for shape in shapes)
+            fixed = max((bound.fixed for bound in bounds), default=0.0)
             for name, weight in _inputs_of(variable):
                 curves[name] = max(curves[name], fixed)
                 widths[name].append(width / abs(weight))
@@ -171,11 +172,6 @@ def _range(
 def _slope(shape: Shape) -> float:
     """Return a bound of the slope of a degree; steps show in flips alone."""
     return degree_bound(shape, "float32").per_unit
-
-
-def _mixed_cost(shape: Shape) -> float:
-    """Return the largest error of a degree whose place on the curve is double."""
-    return degree_bound(shape, "mixed").fixed
 
 
 def _width(shape: Shape) -> float:

@@ -86,11 +86,9 @@ def pointed(
     """
     check_tolerance(tolerance)
     change: _Change = _Change(tolerance, keeps)
-    result: D = (
-        replace(document, variables=change.variables(document.variables))
-        if isinstance(document, RuleBase)
-        else _pointed_system(document, change)
-    )
+    result: D = replace(document, variables=change.variables(document.variables))
+    if isinstance(result, FuzzySystem):
+        result = replace(result, outputs=change.variables(result.outputs))
     if change.reasons:
         head = f"cannot write the curves of {document.name} as points:"
         raise LossError("\n  ".join([head, *change.reasons]))
@@ -107,11 +105,6 @@ def check_tolerance(tolerance: float) -> None:
         raise ValueError(
             f"tolerance: must be above 0 and below 1, such as 1e-3, not {tolerance!r}"
         )
-
-
-def _pointed_system(system: FuzzySystem, change: _Change) -> FuzzySystem:
-    inputs = change.variables(system.variables)
-    return replace(system, variables=inputs, outputs=change.variables(system.outputs))
 
 
 class _Change:
