@@ -340,21 +340,17 @@ def _certify_ranges(rules: RuleBase, dtype: Dtype) -> Certificate:
     if not reasons:
         errors = {key: np.array(error) for key, error in terms.items()}
         delta = float(_joined(rules, dtype, errors))
+        if not delta < 1.0:
+            delta, reasons = None, ["the errors of a rule's degrees add up to 1"]
     return Certificate(
         dtype,
         "rules",
-        delta if delta is not None and delta < 1.0 else None,
+        delta,
         f"{_origin(rules, dtype)}, for values in the declared ranges",
         _term_texts(rules, dtype, terms),
         _value_bounds(rules, dtype, ranges),
-        tuple(dict.fromkeys(reasons)) or _too_long(delta),
+        tuple(dict.fromkeys(reasons)),
     )
-
-
-def _too_long(delta: float | None) -> tuple[str, ...]:
-    if delta is None or delta < 1.0:
-        return ()
-    return ("the errors of a rule's degrees add up to 1",)
 
 
 Ranges = Mapping[str, "tuple[Reals, Reals]"]

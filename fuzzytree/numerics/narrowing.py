@@ -89,7 +89,10 @@ def _shape_losses(where: str, shape: Shape) -> Iterator[Loss]:
             yield from _order_losses(where, "ends", [value for _, value in given])
             for name, edge, end in (("left", low, left), ("right", high, right)):
                 if edge is not None and end is not None:
-                    yield from _flank_losses(where, name, edge, end)
+                    span, width = edge - end, f"{name} flank's width"
+                    numbers = [(f"{name} flank's end", end), (width, span)]
+                    yield from _number_losses(where, numbers)
+                    yield from _zero_losses(where, width, span)
         case LR(mean=mean, left=below, right=above):
             yield from _number_losses(where, [("mean", mean)])
             for name, side in (("left", below), ("right", above)):
@@ -121,13 +124,6 @@ def _peak_losses(where: str, points: Points) -> Iterator[Loss]:
                 "and the degrees between them are gone"
             )
             yield Loss(where, text, lost)
-
-
-def _flank_losses(where: str, name: str, edge: float, end: float) -> Iterator[Loss]:
-    span = edge - end
-    numbers = [(f"{name} flank's end", end), (f"{name} flank's width", span)]
-    yield from _number_losses(where, numbers)
-    yield from _zero_losses(where, f"{name} flank's width", span)
 
 
 def _number_losses(where: str, numbers: Sequence[tuple[str, float]]) -> Iterator[Loss]:
