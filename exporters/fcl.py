@@ -135,16 +135,12 @@ def write(
     if checklist:
         comments += [f" {line}" for line in check_list(system).splitlines()]
     comments.append(f" {TITLE}")
-    lines = [*(_comment(one, words) for one in comments), *_text(system, names, words)]
+    start, end = ("(*", " *)") if dialect == "iec" else ("//", "")
+    lines = [f"{start}{one}{end}" for one in comments]
+    lines += _text(system, names, words)
     remarks += _remarks(system, names, words)
     text = "\n".join(lines) + "\n"
     return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
-
-
-def _comment(text: str, words: FclWords) -> str:
-    if words.name == "iec":
-        return f"(*{text} *)"
-    return f"//{text}"
 
 
 class _FclNames(FileNames, frozen=True):

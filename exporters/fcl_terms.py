@@ -12,7 +12,6 @@ from fuzzytree.exporters.fuzzy_files import with_labels, without_heights
 from fuzzytree.formats import shape_in_fcl
 from fuzzytree.model import (
     Call,
-    Curve,
     Expression,
     Formula,
     FuzzySystem,
@@ -58,8 +57,11 @@ def term_text(
         return None if is_new else text  # fuzzylite 6 does not know the two
     if words.name != "jfuzzylogic" or label.height != 1.0:
         return None
+    if is_weighted and isinstance(curve, Formula):
+        text = _formula_text(curve.expression, names)
+        return None if text is None else f"FUNCTION {text}"
     if is_weighted:
-        return _function_text(curve, names)
+        return None
     shape = shape_in_fcl(curve)
     return None if shape is None else " ".join([shape[0], *map(number, shape[1])])
 
@@ -70,15 +72,6 @@ _FUNCTIONS = {
     "log": "LN",
     "log10": "LOG",
 }
-
-
-def _function_text(curve: Curve, names: Names) -> str | None:
-    match curve:
-        case Formula(expression=expression):
-            text = _formula_text(expression, names)
-            return None if text is None else f"FUNCTION {text}"
-        case _:
-            return None
 
 
 def _formula_text(expression: Expression, names: Names) -> str | None:

@@ -349,7 +349,7 @@ def _groups(tokens: Sequence[Token]) -> Iterator[list[Token]]:
                 tokens,
                 index,
                 in_variables=in_variables,
-                may_lead=_leads(group, is_first),
+                may_lead=is_first or group[0].upper() in _EDGES,
             )
         ):
             yield _typed(group, in_variables=in_variables)
@@ -368,11 +368,6 @@ def _is_whole(group: Sequence[Token], *, is_first: bool) -> bool:
         return False
     needed = {"FUZZIFY": 2, "DEFUZZIFY": 2, "FUNCTION_BLOCK": 99, "RULEBLOCK": 99}
     return is_first or len(group) >= needed.get(word, 1)
-
-
-def _leads(group: Sequence[Token], is_first: bool) -> bool:
-    """Return whether a statement's first word can stand here without `;` before it."""
-    return is_first or group[0].upper() in _EDGES
 
 
 def _starts(
