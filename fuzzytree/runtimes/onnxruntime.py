@@ -424,8 +424,11 @@ def parsed(content: bytes, name: str) -> onnx.ModelProto:
     for fault in _part_faults(proto):
         raise ReadError(f"{name}: {fault}; {_ANEW}")
     texts_of(proto, name)
-    for fault in _operator_faults(proto):
-        raise ReadError(f"{name}: {fault}; {_ANEW}")
+    for node in proto.graph.node:  # operators of other domains among them
+        if OPERATORS.get(node.op_type) != node.domain:
+            whose = f" of {node.domain!r}" if node.domain else ""
+            what = f"no graph of fuzzytree has the operator {node.op_type!r}{whose}"
+            raise ReadError(f"{name}: {what}; {_ANEW}")
     return proto
 
 
@@ -553,14 +556,6 @@ def _part_faults(message: Any) -> Iterator[str]:
             texts = (text for text in values if isinstance(text, bytes))
             if any(text != text.decode(errors="ignore").encode() for text in texts):
                 yield f"its {kind} has a {field.name!r} that is no UTF-8"
-
-
-def _operator_faults(proto: onnx.ModelProto) -> Iterator[str]:
-    """Yield the operators that are never written, those of other domains among them."""
-    for node in proto.graph.node:
-        if OPERATORS.get(node.op_type) != node.domain:
-            whose = f" of {node.domain!r}" if node.domain else ""
-            yield f"no graph of fuzzytree has the operator {node.op_type!r}{whose}"
 
 
 def _check_signature(proto: onnx.ModelProto, facts: Facts, name: str) -> None:

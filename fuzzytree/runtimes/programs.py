@@ -115,7 +115,7 @@ class ProgramPlan:
 
 def plan_program(program: Program) -> ProgramPlan:
     """Return what running a program needs, computed once."""
-    still = _still_values(program)
+    still = tuple(map(_still_value, still_results(program)))
     last: dict[int, int] = {}  # the step that is the last to need another one
     for place, step in enumerate(program.steps):
         last |= dict.fromkeys(step.arguments, place)
@@ -183,15 +183,10 @@ def _run_chunk(plan: ProgramPlan, values: FloatArray, out: FloatArray) -> None:
         out[line] = known[place]
 
 
-def _still_values(program: Program) -> tuple[Values | None, ...]:
-    """Return the results that are the same for all rows, samples as a column."""
-    return tuple(
-        None if value is None else _still_value(value)
-        for value in still_results(program)
-    )
-
-
-def _still_value(numbers: StepValue) -> Values:
+def _still_value(numbers: StepValue | None) -> Values | None:
+    """Return a result that is the same for all rows, samples as a column."""
+    if numbers is None:
+        return None
     value = np.array(numbers)
     return value.reshape(-1, 1) if isinstance(numbers, list) else value
 
