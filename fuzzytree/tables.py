@@ -804,21 +804,10 @@ def class_names(cells: Sequence[Cells]) -> list[str | None]:
         >>> class_names([[1.0, 2.0, None], ["01", ""]])
         ['1', '2', None, '01', None]
     """
-    values = [value for part in cells for value in plain(part)]
-    floats = [v for v in values if isinstance(v, float) and math.isfinite(v)]
-    is_whole = all(v.is_integer() for v in floats)
-    return [_class_name(value, is_whole=is_whole) for value in values]
-
-
-def _class_name(value: object, *, is_whole: bool) -> str | None:
-    if isinstance(value, str):
-        return str(value) if value.strip() else None  # numpy has its own texts
-    if is_missing(value):
-        return None
-    if isinstance(value, float):
-        is_short = is_whole and math.isfinite(value)
-        return str(int(value)) if is_short else repr(float(value))
-    return str(value)
+    labels = ClassLabels()
+    codes = [code for part in cells for code in labels.add(*coded_classes(part))]
+    names = [*labels.names(), None]
+    return [names[code] for code in codes]
 
 
 class ClassLabels:
@@ -906,11 +895,13 @@ def coded_classes(cells: Cells) -> _Coded:
     places: list[int] = []
     labels: list[object] = []
     for value in values:
-        name = _class_name(value, is_whole=False)
-        if name is None:
+        is_blank = isinstance(value, str) and not value.strip()
+        if is_blank or is_missing(value):
             places.append(-1)
             continue
-        key = (name, isinstance(value, float))
+        key = (str(value), False)
+        if isinstance(value, float):  # numpy has its own
+            key = (repr(float(value)), True)
         if key not in keys:
             labels.append(value.item() if isinstance(value, np.generic) else value)
         places.append(keys.setdefault(key, len(keys)))
