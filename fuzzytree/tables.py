@@ -1410,23 +1410,14 @@ def _opened(path: str, title: str) -> io.BufferedReader:
         raise TableError(f"{title}: a URL is not read; download the table first")
     try:
         if "://" in path:
-            return _fetched(path)
+            from pyarrow import fs
+
+            system, place = fs.FileSystem.from_uri(path)  # such as s3://place/t.csv
+            return io.BufferedReader(system.open_input_file(place))
         check_stream(path)
         return Path(path).open("rb")
     except (OSError, ValueError) as error:
         raise TableError(f"{title}: cannot be read: {reason(error)}") from error
-
-
-def _fetched(path: str) -> io.BufferedReader:
-    """Return a file of an object store that pyarrow knows, such as s3://place/t.csv."""
-    import pyarrow as pa
-    from pyarrow import fs
-
-    try:
-        system, place = fs.FileSystem.from_uri(path)
-        return io.BufferedReader(system.open_input_file(place))
-    except pa.ArrowInvalid as error:
-        raise ValueError(str(error)) from error
 
 
 def _stream_pieces(
