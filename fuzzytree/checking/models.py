@@ -176,8 +176,75 @@ class CheckedModel:
 
     def shipped(self, title: str, other: Any) -> Iterator[Finding]:
         """Compare a file that is read as a model: its content, then its answers."""
-        terms, tolerance = self.terms, self.tolerance
-        yield from _shipped(title, other, self.model, self.rows, terms, tolerance)
+        model, rows = self.model, self.rows
+        if isinstance(other, FuzzyTree) and not isinstance(model, FuzzyTree):
+            other = _as_rules(other, model) or other
+        is_tree = isinstance(other, FuzzyTree)
+        kind: Kind | None = None if is_tree else other.kind or "relative"
+        expected = self._counterpart(other.semantics.conjunction, kind)
+        for what, one, two in (
+            ("inputs", other.inputs, model.inputs),
+            ("classes", sorted(other.classes), sorted(model.classes)),
+        ):
+            if one != two:
+                if expected is not None:
+                    yield _content(title, other, expected, [])
+                fault = f"its {what} are {', '.join(one)}"
+                yield counted("file", title, f"the model's {what}", 1, (fault,))
+                return
+        actual = ModelRun(title, other, baseline().load(other)(rows.values))
+        base = native_base(expected or model, "float64", rows)
+        near = [*self._near(title, actual, base)]
+        if near:
+            yield from near
+            return
+        is_like = expected is not None and other.classes == model.classes
+        answers = (compare_bits if is_like else compare_answers)(actual, base, rows)
+        if expected is None:
+            yield judged(title, "the model", (self._no_counterpart(),), [answers])
+        else:
+            yield _content(title, other, expected, [answers])
+        yield answers
+
+    def _near(
+        self, title: str, actual: ModelRun, base: ModelRun
+    ) -> Iterator[Comparison]:
+        """Compare rules that have points for curves of others, within their bound."""
+        model, other, values = base.model, actual.model, self.rows.values
+        if not (isinstance(model, RuleBase) and isinstance(other, RuleBase)):
+            return
+        try:
+            near = by_points(model, self.tolerance)
+        except LossError:
+            return
+        if near.terms and near.model == other:
+            bound = short_above(near.bound)
+            against = f"the model within {bound}: curves became points"
+            yield counted("file", title, against, 1, ())
+            allowed = near.bound + strength_bounds(model, "float64", values)[0]
+            allowed += strength_bounds(other, "float64", values)[0]
+            yield compare_within(
+                actual, base, self.rows, allowed=allowed, origin=near.origin
+            )
+
+    def _counterpart(self, conjunction: Conjunction, kind: Kind | None) -> Model | None:
+        """Return the tree (kind None) or the rules that a file should hold.
+
+        None if they cannot be made from the model, or are raw where they should not be.
+        """
+        model = self.model
+        if not isinstance(model, FuzzyTree):
+            return model if kind else None
+        if kind == "raw" and not (model.sets and self.terms == "raw"):
+            return None
+        return rules_from_tree(model, kind, conjunction=conjunction) if kind else model
+
+    def _no_counterpart(self) -> str:
+        if not isinstance(self.model, FuzzyTree):
+            return "it is a tree, and no tree can be made of rules"
+        if self.terms != "raw":
+            return OTHER_FUNCTION
+        return "raw rules cannot be made of a tree without fitted sets"
 
     def foreign(self, file: OnnxModel) -> str | None:
         """Return why an ONNX file cannot be one of this model; None if it can be."""
@@ -194,9 +261,8 @@ class CheckedModel:
         """Return the form that an ONNX file should hold, or why there is none."""
         kind: Kind | None = "raw" if file.kind == "raw" else "relative"
         kind = None if file.representation == "tree" else kind
-        conjunction = file.semantics.conjunction
-        form = _counterpart(self.model, conjunction, kind, self.terms)
-        return form or _no_counterpart(self.model, self.terms)
+        form = self._counterpart(file.semantics.conjunction, kind)
+        return form or self._no_counterpart()
 
     def file_rows(self, title: str, file: OnnxModel) -> Iterator[Finding]:
         """Compare the answers of an ONNX file with the native ones.
@@ -276,89 +342,11 @@ def _contract(
     return compare_bits(actual, base, rows)
 
 
-def _shipped(
-    title: str,
-    other: Model,
-    model: Model,
-    rows: RowSet,
-    terms: Kind,
-    tolerance: float,
-) -> Iterator[Finding]:
-    if isinstance(other, FuzzyTree) and not isinstance(model, FuzzyTree):
-        other = _as_rules(other, model) or other
-    kind = None if isinstance(other, FuzzyTree) else other.kind or "relative"
-    expected = _counterpart(model, other.semantics.conjunction, kind, terms)
-    for what, one, two in (
-        ("inputs", other.inputs, model.inputs),
-        ("classes", sorted(other.classes), sorted(model.classes)),
-    ):
-        if one != two:
-            if expected is not None:
-                yield _content(title, other, expected, [])
-            fault = f"its {what} are {', '.join(one)}"
-            yield counted("file", title, f"the model's {what}", 1, (fault,))
-            return
-    actual = ModelRun(title, other, baseline().load(other)(rows.values))
-    base = native_base(expected or model, "float64", rows)
-    near = [*_near(title, actual, base, rows, tolerance)]
-    if near:
-        yield from near
-        return
-    is_like = expected is not None and other.classes == model.classes
-    answers = (compare_bits if is_like else compare_answers)(actual, base, rows)
-    if expected is None:
-        yield judged(title, "the model", (_no_counterpart(model, terms),), [answers])
-    else:
-        yield _content(title, other, expected, [answers])
-    yield answers
-
-
-def _near(
-    title: str, actual: ModelRun, base: ModelRun, rows: RowSet, tolerance: float
-) -> Iterator[Comparison]:
-    """Compare rules that have points for the curves of others, within their bound."""
-    model, other = base.model, actual.model
-    if not (isinstance(model, RuleBase) and isinstance(other, RuleBase)):
-        return
-    try:
-        near = by_points(model, tolerance)
-    except LossError:
-        return
-    if near.terms and near.model == other:
-        against = f"the model within {short_above(near.bound)}: curves became points"
-        yield counted("file", title, against, 1, ())
-        allowed = near.bound + strength_bounds(model, "float64", rows.values)[0]
-        allowed += strength_bounds(other, "float64", rows.values)[0]
-        yield compare_within(actual, base, rows, allowed=allowed, origin=near.origin)
-
-
 def _as_rules(tree: FuzzyTree, model: RuleBase) -> RuleBase | None:
     """Return the rules of a tree that a model made from it should equal."""
     if model.kind is None or (model.kind == "raw" and not tree.sets):
         return None
     return rules_from_tree(tree, model.kind, conjunction=model.semantics.conjunction)
-
-
-def _no_counterpart(model: Model, terms: Kind) -> str:
-    if isinstance(model, FuzzyTree):
-        if terms != "raw":
-            return OTHER_FUNCTION
-        return "raw rules cannot be made of a tree without fitted sets"
-    return "it is a tree, and no tree can be made of rules"
-
-
-def _counterpart(
-    model: Model, conjunction: Conjunction, kind: Kind | None, terms: Kind
-) -> Model | None:
-    """Return the tree (kind None) or the rules that a file should hold.
-
-    None if they cannot be made from the model, or are raw where they should not be.
-    """
-    if not isinstance(model, FuzzyTree):
-        return model if kind else None
-    if kind == "raw" and not (model.sets and terms == "raw"):
-        return None
-    return rules_from_tree(model, kind, conjunction=conjunction) if kind else model
 
 
 def _content(
