@@ -53,53 +53,38 @@ _OVER = 0.25  # how far a fit first follows a curve beyond its limits
 _REFITS = 6  # of a clipped curve
 
 
-def curve_error(p: FloatArray, r: FloatArray, last: float, top: float) -> float:
-    """Return a bound of the difference of two polynomials on [0, last], clipped.
+def lower_curve(p: FloatArray, degree: int) -> FloatArray:
+    """Return a polynomial of at most a degree that is close to another one on [0, 1].
 
-    Args:
-        p: c0, c1, ...
-        r: The same of the other one.
-        last: Up to where.
-        top: The upper limit of both; the lower one is 0.
-    """
-    start, end = np.zeros(1), np.array([last])
-    return distance(start, end, p.reshape(-1, 1), r.reshape(-1, 1), top)
-
-
-def lower_curve(p: FloatArray, degree: int, last: float, top: float) -> FloatArray:
-    """Return a polynomial of at most a degree that is close to another one, clipped.
-
-    Both are 0 at 0. If p never falls on [0, last], clipped, neither does the result,
-    for a straight line is mixed in, as little as it takes. What p does beyond its
-    limits is of no account, but it may be easier to follow a little further: the best
-    of several fits is taken, of lower degrees too where a line had to be mixed in.
+    Both are clipped to [0, 1], and 0 at 0. If p never falls there, neither does the
+    result, for a straight line is mixed in, as little as it takes. What p does beyond
+    its limits is of no account, but it may be easier to follow a little further: the
+    best of several fits is taken, of lower degrees too where a line had to be mixed in.
 
     Args:
         p: c0 = 0, c1, ...
         degree: From 1 to 8, below that of p.
-        last: Up to where; above 0.
-        top: Where p is clipped.
 
     Example:
-        >>> lower_curve(np.array([0.0, 0.0, 1.0]), 1, 1.0, 1.0).round(3).tolist()
+        >>> lower_curve(np.array([0.0, 0.0, 1.0]), 1).round(3).tolist()
         [0.0, 0.828]
     """
-    grid = last * (1.0 - np.cos(np.pi * np.arange(1, _GRID + 1) / _GRID)) / 2.0
+    grid = (1.0 - np.cos(np.pi * np.arange(1, _GRID + 1) / _GRID)) / 2.0
     powers = grid.reshape(-1, 1) ** np.arange(1, len(p))
     height = powers @ p[1:]
-    goal = np.clip(height, 0.0, top)
+    goal = np.clip(height, 0.0, 1.0)
     is_rising = bool((np.diff(goal) >= 0).all())
     best, least = np.zeros(degree + 1), math.inf
     for size in range(degree, 0, -1):
         is_plain = True
-        for fit in _fits(powers[:, :size], height, top):
+        for fit in _fits(powers[:, :size], height):
             found = np.concatenate([[0.0], fit, np.zeros(degree - size)])
             if is_rising:
-                risen = _risen(found, last, top, float(goal[-1]))
+                risen = _risen(found, float(goal[-1]))
                 is_plain &= risen is found
                 found = risen
             reached = powers[:, :degree] @ found[1:]
-            error = float(np.abs(np.clip(reached, 0.0, top) - goal).max())
+            error = float(np.abs(np.clip(reached, 0.0, 1.0) - goal).max())
             if error < least and np.abs(found).sum() <= _MOST:
                 best, least = found, error
         if is_plain:
@@ -107,35 +92,34 @@ def lower_curve(p: FloatArray, degree: int, last: float, top: float) -> FloatArr
     return best
 
 
-def _fits(powers: FloatArray, height: FloatArray, top: float) -> Iterator[FloatArray]:
+def _fits(powers: FloatArray, height: FloatArray) -> Iterator[FloatArray]:
     """Yield c1, c2, ... of fits that differ in what they do where a curve is clipped.
 
     The first follows the clipped curve, the second the curve. For the others the goal
     beyond a limit is the fit before, as far as that is beyond the limit too; so what is
     left of the error can only become less.
     """
-    yield _exchange(powers, np.clip(height, 0.0, top))
-    if height.max() <= top and height.min() >= 0.0:
+    yield _exchange(powers, np.clip(height, 0.0, 1.0))
+    if height.max() <= 1.0 and height.min() >= 0.0:
         return
     yield _exchange(powers, height)
-    fit = _exchange(powers, np.clip(height, -_OVER, top + _OVER))
+    fit = _exchange(powers, np.clip(height, -_OVER, 1.0 + _OVER))
     for _ in range(_REFITS):
         yield fit
         reached = powers @ fit
-        goal = np.where(height >= top, np.maximum(reached, top), height)
+        goal = np.where(height >= 1.0, np.maximum(reached, 1.0), height)
         goal = np.where(height <= 0.0, np.minimum(reached, 0.0), goal)
         fit = _exchange(powers, goal)
 
 
-def _risen(found: FloatArray, last: float, top: float, height: float) -> FloatArray:
+def _risen(found: FloatArray, slope: float) -> FloatArray:
     """Return a polynomial that never falls where it is clipped, by mixing a line in."""
     c = found.reshape(-1, 1)
-    grid = np.linspace(0.0, last, _GRID + 1)
-    above = np.flatnonzero(values_at(c, grid) >= top)
-    end = float(grid[above[0]]) if len(above) else last
-    is_kept = end == last or lowest(c, last, first=end) >= top
-    fall = lowest(derivative(c), end if is_kept else last)
-    slope = height / last
+    grid = np.linspace(0.0, 1.0, _GRID + 1)
+    above = np.flatnonzero(values_at(c, grid) >= 1.0)
+    end = float(grid[above[0]]) if len(above) else 1.0
+    is_kept = end == 1.0 or lowest(c, 1.0, first=end) >= 1.0
+    fall = lowest(derivative(c), end if is_kept else 1.0)
     if fall >= 0.0 or slope <= 0.0:
         return found
     fall -= 2.0**-30 * slope  # for the rounding of the mixture
@@ -310,11 +294,12 @@ def _lower_side(side: Side, degree: int) -> tuple[Side, float]:
     body = np.array([float(c) for c in body_coefficients(side.curve)])
     fall = -body
     fall[0] = 0.0
-    fitted = lower_curve(fall, degree, 1.0, 1.0)
+    fitted = lower_curve(fall, degree)
     inner = np.polynomial.Polynomial(fitted[1:])(np.polynomial.Polynomial([0.5, 0.5]))
     curve = tuple(inner.coef.tolist())
     lowered = np.array([float(c) for c in body_coefficients(curve)])
-    bound = curve_error(body, lowered, 1.0, 1.0)
+    ends = np.zeros(1), np.ones(1)
+    bound = distance(*ends, body.reshape(-1, 1), lowered.reshape(-1, 1), 1.0)
     return Side(side.spread, curve, side.reach), bound
 
 

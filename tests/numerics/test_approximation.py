@@ -290,7 +290,7 @@ def test_a_lower_curve_keeps_its_ends_and_never_falls(name: str, wanted: int) ->
 def test_a_square_is_best_followed_by_a_line_of_slope_two_root_two_less_two() -> None:
     # max |q**2 - c q| is least where c**2 / 4 = 1 - c: c = 2 sqrt(2) - 2.
     slope = 2.0 * math.sqrt(2.0) - 2.0
-    found = lower_curve(np.array([0.0, 0.0, 1.0]), 1, 1.0, 1.0)
+    found = lower_curve(np.array([0.0, 0.0, 1.0]), 1)
     assert found.tolist() == pytest.approx([0.0, slope], abs=1e-4)
 
 
