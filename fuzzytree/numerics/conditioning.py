@@ -97,7 +97,7 @@ def conduct(shape: Shape) -> tuple[Conduct, ...]:
 
 def _of_side(name: str, side: Side, mean: float) -> Conduct:
     """Judge 1 - t Q(2 t - 1), which should fall with t, from 1 down to 0 at least."""
-    stored = _fractions(side.curve)
+    stored = tuple(map(Fraction, side.curve))
     curve = _side_curve(stored)
     sign = -1 if name == "left" else 1
     spread = sign * Fraction(side.spread)
@@ -105,10 +105,20 @@ def _of_side(name: str, side: Side, mean: float) -> Conduct:
     def place(t: Fraction) -> float:
         return float(Fraction(mean) + t * spread)
 
-    found = [
-        Rise(place(a), place(b), _up(height)) for a, b, height in _falls(curve, sign=1)
-    ]
-    return _conduct(name, curve, _side_sizes(stored, curve), found)
+    rises = [Rise(place(a), place(b), _up(h)) for a, b, h in _rises(curve)]
+    pieces = _side_sizes(stored, curve)
+    largest = [maximum(size) for size, _ in pieces]
+    ratios = [_largest_ratio(size, part) for size, part in pieces]
+    top = maximum(curve)
+    bottom = maximum(tuple(-c for c in curve))
+    return Conduct(
+        name,
+        _rounded(max(b[0] for b in largest), max(b[1] for b in largest)),
+        _rounded(max(b[0] for b in ratios), max(b[1] for b in ratios)),
+        _rounded(max(top[0] - 1, Fraction(0)), max(top[1] - 1, Fraction(0))),
+        _rounded(max(bottom[0], Fraction(0)), max(bottom[1], Fraction(0))),
+        tuple(sorted(rises, key=lambda rise: -rise.height)),
+    )
 
 
 def _side_curve(stored: Curve) -> Curve:
@@ -142,26 +152,6 @@ def _side_sizes(stored: Curve, curve: Curve) -> list[tuple[Curve, Curve]]:
         size[0] += 1
         pieces.append((tuple(size), _substituted(curve, start, Fraction(1, 2))))
     return pieces
-
-
-def _conduct(
-    name: str,
-    curve: Curve,
-    pieces: Sequence[tuple[Curve, Curve]],
-    rises: Sequence[Rise],
-) -> Conduct:
-    largest = [maximum(size) for size, _ in pieces]
-    ratios = [_largest_ratio(size, part) for size, part in pieces]
-    top = maximum(curve)
-    bottom = maximum(tuple(-c for c in curve))
-    return Conduct(
-        name,
-        _rounded(max(b[0] for b in largest), max(b[1] for b in largest)),
-        _rounded(max(b[0] for b in ratios), max(b[1] for b in ratios)),
-        _rounded(max(top[0] - 1, Fraction(0)), max(top[1] - 1, Fraction(0))),
-        _rounded(max(bottom[0], Fraction(0)), max(bottom[1], Fraction(0))),
-        tuple(sorted(rises, key=lambda rise: -rise.height)),
-    )
 
 
 # --- polynomials on [0, 1], exactly
@@ -206,19 +196,13 @@ def _largest_ratio(size: Curve, curve: Curve) -> tuple[Fraction, Fraction]:
     return low, max(low, high)
 
 
-def _falls(curve: Curve, *, sign: int) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
-    """Yield where a curve clipped to [0, 1] moves the wrong way, and by how much.
-
-    Args:
-        curve: The polynomial.
-        sign: 1 to look for where it increases, -1 for where it decreases.
-    """
-    slope = [sign * power * c for power, c in enumerate(curve)][1:] or [Fraction(0)]
+def _rises(curve: Curve) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
+    """Yield where a curve clipped to [0, 1] increases, and by how much."""
+    slope = [power * c for power, c in enumerate(curve)][1:] or [Fraction(0)]
     for start, end in _positive(tuple(slope)):
         before, after = (_clipped(_value(curve, x)) for x in (start, end))
-        height = sign * (after - before)
-        if height > 0:
-            yield start, end, height
+        if after > before:
+            yield start, end, after - before
 
 
 def _positive(curve: Curve) -> list[tuple[Fraction, Fraction]]:
@@ -300,10 +284,6 @@ def _times(one: Sequence[Fraction], two: Sequence[Fraction]) -> list[Fraction]:
         for j, b in enumerate(two):
             product[i + j] += a * b
     return product
-
-
-def _fractions(curve: Sequence[float]) -> Curve:
-    return tuple(Fraction(c) for c in curve)
 
 
 def _clipped(value: Fraction) -> Fraction:
