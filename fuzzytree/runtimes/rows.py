@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.model import Model, Outcome, Part, RuleBase, Variable, stand_ins
+from fuzzytree.model import Model, Outcome, RuleBase, Variable, stand_ins
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -158,29 +158,21 @@ def plan_axes(
     mixed.sort(key=lambda v: -len(v.parts))
     line = {name: i for i, name in enumerate([*inputs, *(v.name for v in mixed)])}
     longest = len(mixed[0].parts) if mixed else 0
-    steps = tuple(
-        _step([v.parts[p] for v in mixed if len(v.parts) > p], line, kind)
-        for p in range(longest)
-    )
+    steps: list[PartsAt] = []
+    for place in range(longest):
+        parts = [v.parts[place] for v in mixed if len(v.parts) > place]
+        lines = np.array([line[part.input] for part in parts], np.int64)
+        weights = np.array([[part.weight] for part in parts], kind)
+        steps.append(
+            PartsAt(lines, weights, np.array([[p.centre] for p in parts], kind))
+        )
     chains = tuple(
         tuple((line[part.input], part.weight, part.centre) for part in v.parts)
         for v in mixed
     )
     known = stand_ins(variables)
     stand = np.array([[known.get(name, np.nan)] for name in inputs], kind)
-    return Axes(line, len(inputs), steps, chains, kind, stand if known else None)
-
-
-def _step(
-    parts: Sequence[Part],
-    line: dict[str, int],
-    dtype: Real,
-) -> PartsAt:
-    return PartsAt(
-        np.array([line[part.input] for part in parts], np.int64),
-        np.array([[part.weight] for part in parts], dtype),
-        np.array([[part.centre] for part in parts], dtype),
-    )
+    return Axes(line, len(inputs), tuple(steps), chains, kind, stand if known else None)
 
 
 def axis_lines(axes: Axes, values: FloatArray) -> Reals:
