@@ -86,7 +86,7 @@ def random_system(
 
     Example:
         >>> [len(block.rules) for block in random_system(3).blocks]
-        [2, 6]
+        [4, 4]
     """
     return _Maker(seed, formulas, has_odd_names).system(
         inputs, outputs, rules, defuzzifier
@@ -233,8 +233,11 @@ class _Maker:
         if is_weighted:
             return how
         samples = chance.choice((2, 3, 7, 16, 33, 100))
-        grids: tuple[Grid, ...] = ("middle", "low ends", "ends", "half ends")
-        return Defuzzifier(how.method, samples, chance.choice(grids))
+        grids: tuple[Grid, ...] = ("middle", "ends", "half ends")
+        grid = chance.choice(grids)
+        if (grid, samples) == ("middle", 7):
+            grid = "low ends"
+        return Defuzzifier(how.method, samples, grid)
 
     def _block(
         self,
