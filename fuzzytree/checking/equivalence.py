@@ -276,7 +276,9 @@ _OWN: Mapping[type[Document], tuple[str, ...]] = {
 def _shape(shape: Shape) -> Shape:
     """Return one shape for all that have its degrees; a band for its points."""
     if isinstance(shape, Points):
-        shape = Points(stepped(shape.values), shape.degrees)
+        # A point that stands twice is one point.
+        points = dict.fromkeys(zip(stepped(shape.values), shape.degrees, strict=True))
+        shape = Points(tuple(x for x, _ in points), tuple(y for _, y in points))
     band = band_of(shape) or shape
     if not isinstance(band, Band):
         return shape

@@ -242,8 +242,8 @@ OF_FORMS = {"FT601", "FT602"}
 
 
 @functools.cache
-def answers(model: Document) -> tuple[AuditAnswer, ...]:
-    """Return what a whole audit, without representations, answers."""
+def answers(model: Document, code: str = "") -> tuple[AuditAnswer, ...]:
+    """Return what a whole audit, without representations, answers; or of one code."""
     data, columns, limits = None, None, {}
     match model:
         case RuleBase(inputs=inputs):
@@ -256,7 +256,7 @@ def answers(model: Document) -> tuple[AuditAnswer, ...]:
         model,
         data=None if data is None else ft.table(data, columns=columns),
         domain=ft.AuditDomain(limits=limits),
-        selection=ft.AuditSelection(skip=["FT6"]),
+        selection=ft.AuditSelection(select=[code] if code else (), skip=["FT6"]),
     )
     assert found.is_complete
     return found.answers
@@ -264,7 +264,9 @@ def answers(model: Document) -> tuple[AuditAnswer, ...]:
 
 def answers_for(model: Document, code: str) -> list[AuditAnswer]:
     """Return what a whole audit answers to one kind of question."""
-    return [one for one in answers(model) if one.code == code]
+    is_on_request = code == "FT203"
+    every = answers(model, code if is_on_request else "")
+    return [one for one in every if one.code == code]
 
 
 def test_every_code_of_an_audit_is_planted_or_said_why_not() -> None:
