@@ -23,6 +23,7 @@ from fuzzytree.model import (
     FuzzyTree,
     Hedge,
     Leaf,
+    Model,
     Name,
     Node,
     Not,
@@ -273,12 +274,27 @@ _OWN: Mapping[type[Document], tuple[str, ...]] = {
 """The parts of a model beside variables and semantics."""
 
 
+def with_points_once(model: Model) -> Model:
+    """Return a model in which a point that stands twice stands once, as FLL has it."""
+
+    def term(term: Term) -> Term:
+        if isinstance(term.function, Points):
+            return replace(term, function=_points_once(term.function))
+        return term
+
+    variables = (replace(v, terms=tuple(map(term, v.terms))) for v in model.variables)
+    return replace(model, variables=tuple(variables))
+
+
+def _points_once(points: Points) -> Points:
+    pairs = dict.fromkeys(zip(points.values, points.degrees, strict=True))
+    return Points(tuple(x for x, _ in pairs), tuple(y for _, y in pairs))
+
+
 def _shape(shape: Shape) -> Shape:
     """Return one shape for all that have its degrees; a band for its points."""
     if isinstance(shape, Points):
-        # A point that stands twice is one point.
-        points = dict.fromkeys(zip(stepped(shape.values), shape.degrees, strict=True))
-        shape = Points(tuple(x for x, _ in points), tuple(y for _, y in points))
+        shape = _points_once(Points(stepped(shape.values), shape.degrees))
     band = band_of(shape) or shape
     if not isinstance(band, Band):
         return shape

@@ -26,6 +26,7 @@ from fuzzytree.checking.comparing import (
     probed,
     unequal,
 )
+from fuzzytree.checking.equivalence import with_points_once
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
     TOLERANCE,
@@ -357,7 +358,7 @@ def _content(
     What `fuzzytree needs` writes is made once more, then compared with the model by
     proof; what is left of a tree need not serve all that the tree does.
     """
-    fault = first_difference(expected, other)
+    fault = first_difference(with_points_once(expected), with_points_once(other))
     for uses in _SERVED if fault else ():
         if "raw" in uses and not (isinstance(expected, FuzzyTree) and expected.sets):
             continue
