@@ -1,3 +1,5 @@
+from .conversion.canonical import canonical_form as canonical_form
+from .conversion.canonical import points_once as points_once
 from .conversion.facts import FACTS as FACTS
 from .conversion.facts import as_rules as as_rules
 from .conversion.facts import as_written as as_written

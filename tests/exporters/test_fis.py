@@ -10,7 +10,6 @@ from typing import get_args
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis import write
 from fuzzytree.exporters.fis_terms import term_of
@@ -53,7 +52,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.model.contracts import Written
 from fuzzytree.model.rulebase import Points, RuleBase
-from fuzzytree.semantics import as_system, flattened, pointed
+from fuzzytree.semantics import as_system, canonical_form, flattened, pointed
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import evaluate

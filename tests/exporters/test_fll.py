@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll import write
 from fuzzytree.formats.fll.fll_reader import read_fll
@@ -45,7 +44,7 @@ from fuzzytree.model import (
     Variable,
 )
 from fuzzytree.model.rulebase import LR, Part, Points, RuleBase, Side
-from fuzzytree.semantics import FACTS, Scores, as_system, pointed
+from fuzzytree.semantics import FACTS, Scores, as_system, canonical_form, pointed
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_rows, random_tree

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fml import write
 from fuzzytree.exporters.table import find_format
@@ -41,7 +40,7 @@ from fuzzytree.model import (
     TwoGaussians,
     Variable,
 )
-from fuzzytree.semantics import pointed
+from fuzzytree.semantics import canonical_form, pointed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 

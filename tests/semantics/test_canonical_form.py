@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
@@ -23,6 +22,7 @@ from fuzzytree.model import (
     Term,
     Variable,
 )
+from fuzzytree.semantics import canonical_form
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.random_systems import random_system
 from fuzzytree.testing import random_tree
