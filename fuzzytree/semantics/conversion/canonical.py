@@ -37,8 +37,10 @@ from fuzzytree.model import (
     SystemRule,
     Term,
     Variable,
+    combined,
     joints,
 )
+from fuzzytree.semantics.conversion.joint_terms import operands
 from fuzzytree.semantics.conversion.points import band_of, shape_of, stepped
 
 Names = Mapping[str, str]
@@ -265,24 +267,12 @@ def _ordered(condition: Condition, block: RuleBlock) -> Condition:
             return Not(_ordered(part, block))
         case And(parts=parts) | Or(parts=parts):
             kind = type(condition)
-            is_free = (
-                block.conjunction == "minimum"
-                if kind is And
-                else block.disjunction == "maximum"
-            )
-            ordered = [_ordered(part, block) for part in parts]
-            if is_free:
-                ordered = sorted(
-                    (
-                        inner
-                        for part in ordered
-                        for inner in (part.parts if isinstance(part, kind) else (part,))
-                    ),
-                    key=repr,
-                )
-            elif isinstance(ordered[0], kind):
-                ordered[:1] = ordered[0].parts
-            return ordered[0] if len(ordered) == 1 else kind(tuple(ordered))
+            joined = kind(tuple(_ordered(part, block) for part in parts))
+            ordered = operands(joined, block)
+            norm = block.conjunction if kind is And else block.disjunction
+            if norm in ("minimum", "maximum"):
+                ordered.sort(key=repr)
+            return combined(kind, ordered)
         case _:
             return condition
 
