@@ -30,7 +30,6 @@ from fuzzytree.model import (
     Proposition,
     Rule,
     RuleBase,
-    RuleBlock,
     Semantics,
     Term,
     Value,
@@ -38,6 +37,7 @@ from fuzzytree.model import (
     questions,
 )
 from fuzzytree.numerics import BELOW_ONE
+from fuzzytree.semantics.conversion.canonical import canonical_form
 from fuzzytree.semantics.conversion.joint_terms import with_joint_terms
 from fuzzytree.semantics.conversion.points import band_of, shape_of, stepped
 from fuzzytree.semantics.conversion.scores import Always, Scores, as_system, flattened
@@ -490,99 +490,35 @@ def _plain(system: FuzzySystem, *, has_default: bool) -> object:
         system: The system.
         has_default: Whether a default can answer; of scores some rule always fires.
     """
-    places = {one.name: k for k, one in enumerate(system.all_variables)}
-    labels = {
-        one.name: {label.name: k for k, label in enumerate(one.terms)}
-        for one in system.all_variables
-    }
-    inputs = [
-        ([(shape_of(label.function), label.height) for label in one.terms], one.clips)
-        for one in system.variables
-    ]
-    outputs = [
-        (
-            [(label.function, label.height) for label in one.terms],
-            one.defuzzifier.method,
-            one.default if has_default else None,
-            (one.low, one.high) if one.clips else None,
+    inputs = (replace(one, categories=(), missing=None) for one in system.variables)
+    outputs = (
+        replace(
+            one,
+            default=one.default if has_default else None,
+            aggregation=None if one.defuzzifier.is_weighted else one.aggregation,
         )
         for one in system.outputs
-    ]
-    blocks: list[object] = []
-    for block in system.blocks:
-        flat = _Flat(block, places, labels)
-        rules = [
-            (
-                flat.condition(rule.when),
-                [
-                    (places[c.output], labels[c.output][c.term], c.hedges)
-                    for c in rule.then
-                ],
-                rule.weight,
-            )
-            for rule in block.rules
-        ]
-        blocks.append((rules, sorted(flat.used), _activation(block.activation)))
-    return inputs, outputs, blocks
+    )
+    blocks = (
+        replace(block, activation=_activation(block.activation))
+        for block in system.blocks
+    )
+    return canonical_form(
+        replace(
+            system,
+            variables=tuple(inputs),
+            outputs=tuple(outputs),
+            blocks=tuple(blocks),
+        )
+    )
 
 
-class _Flat:
-    """Conditions of a block as nested tuples, with places for names.
-
-    An AND within an AND is one AND where that gives the same bits: under minimum
-    everywhere, under any norm at its beginning. The same holds for OR.
-    """
-
-    def __init__(
-        self,
-        block: RuleBlock,
-        places: Mapping[str, int],
-        labels: Mapping[str, Mapping[str, int]],
-    ) -> None:
-        self.block, self.places, self.labels = block, places, labels
-        self.used: set[str] = set()
-
-    def condition(self, one: Condition | None) -> tuple[object, ...]:
-        match one:
-            case None:
-                return ()
-            case Proposition(variable=variable, term=label, hedges=hedges):
-                place = None if label is None else self.labels[variable][label]
-                return ("is", self.places[variable], place, hedges)
-            case Not(part=Proposition() as part):
-                return self.condition(replace(part, hedges=("not", *part.hedges)))
-            case Not(part=part):
-                return ("not", self.condition(part))
-            case And(parts=parts):
-                return self._joined("and", parts, self.block.conjunction)
-            case Or(parts=parts):
-                return self._joined("or", parts, self.block.disjunction)
-
-    def _joined(
-        self, word: str, parts: tuple[Condition, ...], norm: str | None
-    ) -> tuple[object, ...]:
-        results: list[object] = []
-        for position, part in enumerate(parts):
-            flat = self.condition(part)
-            is_same = norm in ("minimum", "maximum") or position == 0
-            if is_same and flat[:1] == (word,):
-                results += flat[1:]
-            else:
-                results.append(flat)
-        if len(parts) == 1:
-            return self.condition(parts[0])
-        if norm in ("minimum", "maximum"):
-            results.sort(key=repr)  # in any order they give the same bits
-        self.used.add(f"{word} {norm}")
-        return (word, *results)
-
-
-def _activation(activation: Activation) -> object:
+def _activation(activation: Activation) -> Activation:
     """Return what matters of an activation."""
     match activation.method:
         case "general" | "proportional":
-            return activation.method
+            return Activation(activation.method)
         case "highest" | "lowest":
-            return activation.method, activation.count
+            return Activation(activation.method, activation.count)
         case _:
             return activation
