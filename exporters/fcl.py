@@ -22,12 +22,11 @@ from fuzzytree.exporters.fcl_rules import (
 )
 from fuzzytree.exporters.fcl_terms import (
     as_points,
-    number,
     plain_linear,
     term_text,
     unspeakable,
 )
-from fuzzytree.exporters.fll_text import speakable
+from fuzzytree.exporters.fll_text import number, speakable
 from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
 from fuzzytree.formats import FACTS, MARK, read_fcl
 from fuzzytree.model import (

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from msgspec.structs import replace
 
 from fuzzytree.exporters.fcl_dialects import FclWords
-from fuzzytree.exporters.fll_text import degree_text, number_text, weighted_type
+from fuzzytree.exporters.fll_text import degree_text, number, number_text, weighted_type
 from fuzzytree.exporters.fuzzy_files import with_labels, without_heights
 from fuzzytree.formats import shape_in_fcl
 from fuzzytree.model import (
@@ -28,11 +28,6 @@ from fuzzytree.model import (
 from fuzzytree.semantics import has_numbers, pointed
 
 Names = Mapping[str, str]
-
-
-def number(value: float) -> str:
-    """Return a number in the fewest digits that read back as the same double."""
-    return repr(float(value))
 
 
 def term_text(

@@ -159,7 +159,7 @@ def degree_text(label: Term, names: Mapping[str, str]) -> str | None:
     if label.height != 1.0:
         parts = (*parts, label.height)
     kind, *numbers = parts
-    return " ".join([str(kind), *(_number(float(one)) for one in numbers)])
+    return " ".join([str(kind), *(number(float(one)) for one in numbers)])
 
 
 def weighted_type(output: SystemOutput) -> str:
@@ -176,9 +176,9 @@ def number_text(label: Term, kind: str, names: Mapping[str, str]) -> str | None:
     """Return the class and numbers of a term of a weighted output, or None."""
     match label.function:
         case curves.Singleton(value=value):
-            return f"Constant {_number(value)}"
+            return f"Constant {number(value)}"
         case curves.Linear(weights=weights, offset=offset):
-            return " ".join(["Linear", *map(_number, (*weights, offset))])
+            return " ".join(["Linear", *map(number, (*weights, offset))])
         case curves.Formula(expression=expression):
             return f"Function {fuzzylite_text_of(_renamed(expression, names))}"
         case curve if kind == "TakagiSugeno" and value_at(curve, 0.5) is not None:
@@ -187,7 +187,8 @@ def number_text(label: Term, kind: str, names: Mapping[str, str]) -> str | None:
             return degree_text(label, names)
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
+    """Return a number in the fewest digits that read back as the same double."""
     return repr(float(value))
 
 
