@@ -11,7 +11,6 @@ from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import WordsOf, has_not, hedge_losses, rule_text
 from fuzzytree.exporters.fuzzy_files import grid_losses
 from fuzzytree.formats import (
-    ALWAYS,
     DEFUZZIFIERS,
     JFUZZYLOGIC_PAIRS,
     PAIRS,
@@ -35,7 +34,7 @@ from fuzzytree.model import (
     questions,
     unlike,
 )
-from fuzzytree.semantics import as_system, number_losses
+from fuzzytree.semantics import EVERYWHERE, as_system, number_losses
 
 
 def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
@@ -49,7 +48,7 @@ def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
         return system
     first = system.variables[0]
     name = unlike("always", [label.name for label in first.terms])
-    label = Term(name, ALWAYS)
+    label = Term(name, EVERYWHERE)
     always = Proposition(first.name, (name,))
     return replace(
         system,

@@ -7,7 +7,6 @@ from .fcl.fcl_dialects import MARK as MARK
 from .fcl.fcl_dialects import PAIRS as PAIRS
 from .fcl.fcl_reader import FACTS as FACTS
 from .fcl.fcl_reader import read_fcl as read_fcl
-from .fcl.fcl_rules import ALWAYS as ALWAYS
 from .fcl.fcl_terms import shape_in_fcl as shape_in_fcl
 from .fis.fis_reader import DEFAULTS as DEFAULTS
 from .fis.fis_reader import DIALECT as DIALECT

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Final
 
 import msgspec
 from lark import Token
@@ -40,7 +39,6 @@ from fuzzytree.model import (
     Loss,
     Not,
     Or,
-    Points,
     Proposition,
     RuleBlock,
     SNorm,
@@ -51,6 +49,7 @@ from fuzzytree.model import (
     name_choice,
     questions,
 )
+from fuzzytree.semantics import EVERYWHERE
 
 
 class Scope(msgspec.Struct, frozen=True):
@@ -285,10 +284,6 @@ def _norms(
     return conjunction, disjunction
 
 
-ALWAYS: Final = Points((0.0,), (1.0,))
-"""The curve of the term that rules without a condition use in formats that need one."""
-
-
 def without_questions(system: FuzzySystem) -> FuzzySystem:
     """Return a system that was written here, with rules that have no condition again.
 
@@ -299,7 +294,7 @@ def without_questions(system: FuzzySystem) -> FuzzySystem:
         return system
     first = system.variables[0]
     proposition: Condition = Proposition(first.name, (), ("any",))
-    if first.terms and first.terms[-1].function == ALWAYS:
+    if first.terms and first.terms[-1].function == EVERYWHERE:
         proposition = Proposition(first.name, (first.terms[-1].name,))
         first = replace(first, terms=first.terms[:-1])
     others = [
