@@ -19,6 +19,7 @@ from fractions import Fraction
 from typing import NamedTuple, assert_never
 
 from fuzzytree.model import LR, Band, Points, Shape, Side
+from fuzzytree.numerics.exact import outwards
 
 Curve = tuple[Fraction, ...]
 """Coefficients of powers of the position, the lowest first."""
@@ -105,7 +106,7 @@ def _of_side(name: str, side: Side, mean: float) -> Conduct:
     def place(t: Fraction) -> float:
         return float(Fraction(mean) + t * spread)
 
-    rises = [Rise(place(a), place(b), _up(h)) for a, b, h in _rises(curve)]
+    rises = [Rise(place(a), place(b), outwards(h)[1]) for a, b, h in _rises(curve)]
     pieces = _side_sizes(stored, curve)
     largest = [maximum(size) for size, _ in pieces]
     ratios = [_largest_ratio(size, part) for size, part in pieces]
@@ -291,10 +292,4 @@ def _clipped(value: Fraction) -> Fraction:
 
 
 def _rounded(low: Fraction, high: Fraction) -> NumberBounds:
-    return NumberBounds(-_up(-low), _up(high))
-
-
-def _up(value: Fraction) -> float:
-    """Return the smallest double that is not below a number."""
-    found = float(value)
-    return found if Fraction(found) >= value else math.nextafter(found, math.inf)
+    return NumberBounds(-outwards(-low)[1], outwards(high)[1])

@@ -18,6 +18,7 @@ from typing import NamedTuple
 from fuzzytree.errors import LossError
 from fuzzytree.model import MOST_POINTS, Points
 from fuzzytree.numerics.curves import BELOW_ONE
+from fuzzytree.numerics.exact import outwards
 
 _FARTHEST = Fraction(sys.float_info.max)  # between neighbouring points
 
@@ -95,7 +96,7 @@ def product(one: Lines, other: Lines, tolerance: float) -> tuple[Lines, float]:
         x, first, second = here
         knots.append(_Knot(x, first.at * second.at, first.above * second.above))
     _refuse_many(len(knots))
-    return tuple(knots), _up(worst)
+    return tuple(knots), outwards(worst)[1]
 
 
 def _refuse_many(points: int) -> None:
@@ -193,9 +194,4 @@ def _distance(one: Lines, other: Lines) -> float:
     worst = Fraction(0)
     for _, first, second in _common(one, other):
         worst = max(worst, abs(first.at - second.at), abs(first.above - second.above))
-    return _up(worst)
-
-
-def _up(value: Fraction) -> float:
-    near = float(value)
-    return near if Fraction(near) >= value else math.nextafter(near, math.inf)
+    return outwards(worst)[1]
