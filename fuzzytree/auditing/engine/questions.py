@@ -25,7 +25,7 @@ from fuzzytree.auditing.engine.bounding import (
 )
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.compared import RulePairs
-from fuzzytree.auditing.engine.domain import Domain, Point, contains
+from fuzzytree.auditing.engine.domain import Domain, Point
 from fuzzytree.auditing.engine.levels import (
     Levels,
     Sides,
@@ -52,6 +52,7 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.engine.witnesses import (
     AxisStretch,
     have_one_direction,
+    is_within,
     point_with,
 )
 from fuzzytree.model import BoolArray
@@ -72,10 +73,6 @@ def _is_product(base: Arrangement) -> bool:
 
 def _every(base: Arrangement) -> tuple[int, ...]:
     return tuple(range(1, len(base.rules.rules) + 1))
-
-
-def _is_within(base: Arrangement, point: Point) -> bool:
-    return contains(base.domain, base.rules.variables, point)
 
 
 # --- is there a level that rules reach and rivals do not?
@@ -100,7 +97,7 @@ class _Question(NamedTuple):
         strengths = strengths_at(base, point)
         mine = min((strengths[n - 1] for n in ours), default=ceiling or ONE)
         best = max((strengths[n - 1] for n in rivals), default=ZERO)
-        if not (mine > best and _is_within(base, {**point})):
+        if not (mine > best and is_within(base, {**point})):
             return None
         claims: tuple[Claim, ...]
         if ceiling is not None:
@@ -258,7 +255,7 @@ def largest_lead(
     low = lead_at(base, best, (rule,), others)
     if low < enough:
         result = leader(base, (rule,), others)
-        if _is_within(base, result) and lead_at(base, result, (rule,), others) > low:
+        if is_within(base, result) and lead_at(base, result, (rule,), others) > low:
             best = plainer(base, result, (rule,), others)
             low = lead_at(base, best, (rule,), others)
     name = f"the largest lead of rule {rule}"
@@ -355,7 +352,7 @@ def least_cover(base: Arrangement, clock: Clock | None = None) -> Bracket:
     why = "this is a critical level" if levels.is_exact else _ENCLOSED
     if levels.joined:
         point = leader(base, (), _every(base))
-        high = max(strengths_at(base, point)) if _is_within(base, point) else ONE
+        high = max(strengths_at(base, point)) if is_within(base, point) else ONE
         why = "its inputs depend on each other"
     return Bracket(name, outwards(low)[0], outwards(high)[1], why)
 
@@ -391,7 +388,7 @@ def uncovered(base: Arrangement, clock: Clock | None = None) -> State:
 
 def _bare_witness(base: Arrangement, point: Point) -> Witness | None:
     strengths = strengths_at(base, point)
-    if any(strengths) or not _is_within(base, point):
+    if any(strengths) or not is_within(base, point):
         return None
     every = _every(base)
     claims = (
@@ -429,7 +426,7 @@ class _TieQuestion(NamedTuple):
             and all(strengths[n - 1] < mine for n in self.strict)
             and all(strengths[n - 1] <= mine for n in self.weak)
             and mine > 0
-            and _is_within(self.base, point)
+            and is_within(self.base, point)
         )
         if not holds:
             return None
