@@ -292,7 +292,8 @@ def _run_all(
             with enforced(share):
                 for answer in task.run(msgspec.structs.replace(subject, clock=share)):
                     progress.answers.append(answer)
-                    if _is_late(answer):
+                    state = answer.state
+                    if isinstance(state, Declined) and state.code == _LATE:
                         progress.cut[answer.code] = why
         except OutOfTimeError:
             progress.cut.update(dict.fromkeys(task.codes, why))
@@ -302,10 +303,6 @@ def _run_all(
             rest = [code for one in tasks[position:] for code in one.codes]
             progress.cut.update(dict.fromkeys(rest, INTERRUPTED))
             return
-
-
-def _is_late(answer: AuditAnswer) -> bool:
-    return isinstance(answer.state, Declined) and answer.state.code == _LATE
 
 
 def _reporter(clock: Clock, position: int, count: int) -> Callable[[str, float], None]:
