@@ -34,7 +34,6 @@ from fuzzytree.semantics import from_rules, from_system
 if TYPE_CHECKING:
     import onnx
 
-    from fuzzytree.exporters.onnx_graph import OnnxGraph
 
 FORMAT_VERSION = "1"
 """Of the meaning of inputs, outputs and metadata."""
@@ -265,12 +264,16 @@ def _model_proto(
 ) -> onnx.ModelProto:
     from onnx import TensorProto
 
+    from fuzzytree.exporters import onnx_ends
     from fuzzytree.exporters.onnx_graph import (
         NUMBERS,
         OnnxGraph,
         model_proto,
         np_to_onnx,
     )
+    from fuzzytree.exporters.onnx_rules import rules_graph
+    from fuzzytree.exporters.onnx_steps import program_graph, rows_at_once
+    from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
 
     numbers = NUMBERS[dtype]
     graph = OnnxGraph(opset, numbers)
@@ -287,8 +290,6 @@ def _model_proto(
         kinds["probabilities"] = TensorProto.DOUBLE, ["rows", len(model.classes)]
     facts = _facts(model, dtype, columns, outputs)
     if isinstance(model, FuzzySystem):
-        from fuzzytree.exporters.onnx_steps import program_graph, rows_at_once
-
         kinds["outputs"] = (degree, ["rows", len(model.outputs)])
         program = from_system(model, activations="activations" in outputs)
         program_graph(graph, program, columns, outputs)
@@ -296,7 +297,18 @@ def _model_proto(
     else:
         if readable:
             facts["form"] = "readable"
-        _fill(graph, model, columns, outputs, readable=readable, plain=plain)
+        else:
+            onnx_ends.fill_inputs(graph, model, columns)
+        if isinstance(model, FuzzyTree):
+            is_plain = plain or needs_plain(model)
+            frame = tree_graph(graph, model, columns, is_plain=is_plain)
+            onnx_ends.add_tree_outputs(graph, model, frame, outputs)
+        elif readable:
+            program = from_rules(model, probabilities="probabilities" in outputs)
+            program_graph(graph, program, columns, outputs, model.classes)
+        else:
+            frame, strengths = rules_graph(graph, model, columns)
+            onnx_ends.add_rule_outputs(graph, model, frame, strengths, outputs)
     return model_proto(
         graph,
         facts["carrier"],
@@ -306,38 +318,6 @@ def _model_proto(
         text=_in_words(model, dtype),
         facts=facts,
     )
-
-
-def _fill(
-    graph: OnnxGraph,
-    model: Model,
-    columns: Sequence[str],
-    outputs: Sequence[Output],
-    *,
-    readable: bool,
-    plain: bool,
-) -> None:
-    """Add all nodes of a tree or rule base to a graph."""
-    from fuzzytree.exporters import onnx_ends
-
-    if not readable:
-        onnx_ends.fill_inputs(graph, model, columns)
-    if isinstance(model, FuzzyTree):
-        from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
-
-        is_plain = plain or needs_plain(model)
-        frame = tree_graph(graph, model, columns, is_plain=is_plain)
-        onnx_ends.add_tree_outputs(graph, model, frame, outputs)
-    elif readable:
-        from fuzzytree.exporters.onnx_steps import program_graph
-
-        program = from_rules(model, probabilities="probabilities" in outputs)
-        program_graph(graph, program, columns, outputs, model.classes)
-    else:
-        from fuzzytree.exporters.onnx_rules import rules_graph
-
-        frame, strengths = rules_graph(graph, model, columns)
-        onnx_ends.add_rule_outputs(graph, model, frame, strengths, outputs)
 
 
 def _rule_count(model: Model | FuzzySystem) -> int:
