@@ -17,7 +17,6 @@ from fuzzytree.model import (
     WEIGHT_OF_ONE,
     FuzzyTree,
     Model,
-    Part,
     RuleBase,
     Variable,
     parts_of,
@@ -177,24 +176,14 @@ def _combinations(
             total = _rows(graph, total, ready - finished, len(derived) - finished)
             finished = ready
         parts = [v.parts[position] for v in derived[finished:]]
-        term = _summand(graph, parts, source, columns, kind)
+        term = graph.take(source, [columns.index(part.input) for part in parts])
+        if any(part.centre for part in parts):  # x - 0.0 is x
+            centres = rounded([part.centre for part in parts], kind)
+            term = graph.node("Sub", term, graph.column(centres, "centres"))
+        weights = rounded([part.weight for part in parts], kind)
+        term = graph.node("Mul", term, graph.column(weights, "weights"))
         total = graph.node("Add", total, term) if total else term
     return [*done, total]
-
-
-def _summand(
-    graph: OnnxGraph,
-    parts: Sequence[Part],
-    source: str,
-    columns: Sequence[str],
-    kind: type[RealKind],
-) -> str:
-    value = graph.take(source, [columns.index(part.input) for part in parts])
-    if any(part.centre for part in parts):  # x - 0.0 is x
-        centres = rounded([part.centre for part in parts], kind)
-        value = graph.node("Sub", value, graph.column(centres, "centres"))
-    weights = rounded([part.weight for part in parts], kind)
-    return graph.node("Mul", value, graph.column(weights, "weights"))
 
 
 def _rows(graph: OnnxGraph, block: str, start: int, end: int) -> str:
