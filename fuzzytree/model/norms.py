@@ -114,19 +114,9 @@ _HEDGES: Mapping[Hedge, _Hedging] = {
 }
 
 
-def _drastic_product(n: Numbers[N], a: N, b: N) -> N:
-    is_one = n.equal(n.maximum(a, b), 1.0)
-    return n.where(is_one, n.minimum(a, b), 0.0)
-
-
 def _hamacher_product(n: Numbers[N], a: N, b: N) -> N:
     share = n.divide(a * b, a + b - a * b)
     return n.where(n.equal(a + b, 0.0), 0.0, share)
-
-
-def _drastic_sum(n: Numbers[N], a: N, b: N) -> N:
-    is_zero = n.equal(n.minimum(a, b), 0.0)
-    return n.where(is_zero, n.maximum(a, b), 1.0)
 
 
 def _hamacher_sum(n: Numbers[N], a: N, b: N) -> N:
@@ -138,7 +128,9 @@ T_NORMS: Mapping[TNorm, Norm] = {
     "minimum": lambda n, a, b: n.minimum(a, b),
     "product": lambda n, a, b: a * b,
     "bounded difference": lambda n, a, b: n.maximum(n.constant(0.0), a + b - 1.0),
-    "drastic product": _drastic_product,
+    "drastic product": lambda n, a, b: n.where(
+        n.equal(n.maximum(a, b), 1.0), n.minimum(a, b), 0.0
+    ),
     "einstein product": lambda n, a, b: n.divide(a * b, 2.0 - (a + b - a * b)),
     "hamacher product": _hamacher_product,
     "nilpotent minimum": lambda n, a, b: n.where(
@@ -150,7 +142,9 @@ S_NORMS: Mapping[SNorm, Norm] = {
     "maximum": lambda n, a, b: n.maximum(a, b),
     "algebraic sum": lambda n, a, b: a + b - a * b,
     "bounded sum": lambda n, a, b: n.minimum(n.constant(1.0), a + b),
-    "drastic sum": _drastic_sum,
+    "drastic sum": lambda n, a, b: n.where(
+        n.equal(n.minimum(a, b), 0.0), n.maximum(a, b), 1.0
+    ),
     "einstein sum": lambda n, a, b: n.divide(a + b, 1.0 + a * b),
     "hamacher sum": _hamacher_sum,
     "nilpotent maximum": lambda n, a, b: n.where(
