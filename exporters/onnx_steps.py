@@ -285,9 +285,23 @@ def add_step(
         case "remainder":
             return graph.node("Mod", *operands, fmod=1)
         case "below":
-            return _below(graph, step, operands[0], takes, gives)
+            # One row of truths for each number of the table, which are counted.
+            ranks = [-1] + [1] * (2 if step.samples else 1)
+            table = graph.constant(as_kind(step.table, takes).reshape(ranks), "table")
+            is_below = graph.node("Less", table, operands[0])
+            ones = graph.node("Cast", is_below, to=np_to_onnx(gives))
+            return graph.total(ones, axis=0, keepdims=0)
         case "pick":
-            return _pick(graph, step, operands[0], takes, gives)
+            # Places outside, and NaN, take the first number of the table.
+            zero = graph.number(0.0, takes)
+            last = graph.number(float(len(step.table) - 1), takes)
+            inside = graph.node("LessOrEqual", zero, operands[0])
+            is_last = graph.node("LessOrEqual", operands[0], last)
+            inside = graph.node("And", inside, is_last)
+            place = graph.node("Where", inside, operands[0], zero)
+            place = graph.node("Cast", place, to=np_to_onnx(np.int64))
+            table = graph.constant(as_kind(step.table, gives), "table")
+            return graph.node("Gather", table, place)
         case "running":
             return graph.node("CumSum", *operands, graph.whole(0))
         case "total":
@@ -310,39 +324,6 @@ def _cosine(graph: OnnxGraph, angle: str) -> str:
     square = graph.node("Mul", sine, sine)
     twice = graph.node("Mul", square, graph.number(2.0))
     return graph.node("Sub", graph.number(1.0), twice)
-
-
-def _below(
-    graph: OnnxGraph,
-    step: Step,
-    value: str,
-    takes: type[RealKind],
-    gives: type[RealKind],
-) -> str:
-    """Count the numbers of a table below a value, one row of truths for each."""
-    ranks = [-1] + [1] * (2 if step.samples else 1)
-    table = graph.constant(as_kind(step.table, takes).reshape(ranks), "table")
-    is_below = graph.node("Less", table, value)
-    ones = graph.node("Cast", is_below, to=np_to_onnx(gives))
-    return graph.total(ones, axis=0, keepdims=0)
-
-
-def _pick(
-    graph: OnnxGraph,
-    step: Step,
-    value: str,
-    takes: type[RealKind],
-    gives: type[RealKind],
-) -> str:
-    """Take the entry at a place; places outside, and NaN, take the first."""
-    zero = graph.number(0.0, takes)
-    last = graph.number(float(len(step.table) - 1), takes)
-    inside = graph.node("LessOrEqual", zero, value)
-    inside = graph.node("And", inside, graph.node("LessOrEqual", value, last))
-    place = graph.node("Where", inside, value, zero)
-    place = graph.node("Cast", place, to=np_to_onnx(np.int64))
-    table = graph.constant(as_kind(step.table, gives), "table")
-    return graph.node("Gather", table, place)
 
 
 def _total(graph: OnnxGraph, samples: str, count: int) -> str:
