@@ -117,7 +117,11 @@ def write(
         if scores != "winner":
             raise ValueError("scores: are of rules; a system has outputs of its own")
         refuse_singletons(model, "fll")
-        system, lost = pointed(model, tolerance, keeps=_is_known)
+        system, lost = pointed(
+            model,
+            tolerance,
+            keeps=lambda _, term: not isinstance(term.function, Band | LR),
+        )
         losses += lost
     system, lost = flattened(system)
     losses += [*lost, *_losses(system)]
@@ -149,11 +153,6 @@ def _accepted(names: Sequence[str]) -> NameMap:
     taken = {name.lower() for name in names if name != name.lower()} - {*names}
     reserved = [word for word in _RESERVED if word not in taken]
     return NameMap.of(names, reserved=reserved, longest=LONGEST_NAME)
-
-
-def _is_known(variable: Variable | SystemOutput, term: Term) -> bool:
-    del variable
-    return not isinstance(term.function, Band | LR)
 
 
 def _losses(system: FuzzySystem) -> Iterator[Loss]:
