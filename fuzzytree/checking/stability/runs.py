@@ -182,7 +182,15 @@ def exact_check(
     low = np.where(known, 0.0 if errors.low is None else errors.low, 0.0)
     wrong = flips & ~errors.close | (low > allowed)
     bounded = np.where(allowed < 1.0, low, 0.0)
-    faults = [_fault(one, values, outcome, wrong, low, allowed)] if wrong.any() else []
+    faults: list[str] = []
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[np.argmax(low[wrong])])
+        fault = f"rule {outcome.rule[row]} wins and another is right"
+        if low[row] > allowed[row]:
+            fault = f"strengths off by {low[row]:.3g}, {allowed[row]:.3g} allowed"
+        count = f"{int(wrong.sum())} of {wrong.size} rows are beyond the bound"
+        where = row_text(one.model.inputs, values, row)
+        faults.append(f"{one.title}: {count}: {fault}: {where}")
     worst = int(np.argmax(bounded)) if low.size else 0
     return ExactCheck(
         values.shape[1],
@@ -206,23 +214,6 @@ def allowed_errors(one: LoadedForm, values: FloatArray) -> FloatArray:
     if own is not None:
         allowed = np.minimum(allowed + own(one.model)[0], 1.0)
     return allowed
-
-
-def _fault(
-    one: LoadedForm,
-    values: FloatArray,
-    outcome: Outcome,
-    wrong: BoolArray,
-    low: FloatArray,
-    allowed: FloatArray,
-) -> str:
-    row = int(np.flatnonzero(wrong)[np.argmax(low[wrong])])
-    text = f"{one.title}: {int(wrong.sum())} of {wrong.size} rows are beyond the bound"
-    where = row_text(one.model.inputs, values, row)
-    if low[row] > allowed[row]:
-        sizes = f"strengths off by {low[row]:.3g}, {allowed[row]:.3g} allowed"
-        return f"{text}: {sizes}: {where}"
-    return f"{text}: rule {outcome.rule[row]} wins and another is right: {where}"
 
 
 def missing_rows(model: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
