@@ -136,11 +136,20 @@ class NameMap(msgspec.Struct, frozen=True):
                     result[name] = name
         counts: dict[str, int] = {}
         for name in originals:
-            if name not in result:
-                result[name] = _unlike(
-                    allowed, allowed.adapted(name), words, used, counts
-                )
-                used.add(allowed.key(result[name]))
+            if name in result:
+                continue
+            plain = allowed.adapted(name)
+            if plain.casefold() in words and not allowed.is_too_long(plain + filler):
+                plain += filler
+            unique, count = plain, counts.get(plain, 1)
+            while allowed.key(unique) in used or unique.casefold() in words:
+                count += 1
+                end = f"{filler}{count}"
+                room = longest - len(end) if longest else len(plain)
+                unique = plain[:room] + end
+            counts[plain] = count
+            result[name] = unique
+            used.add(allowed.key(unique))
         return NameMap({name: result[name] for name in originals})
 
     def __getitem__(self, name: str) -> str:
@@ -285,24 +294,3 @@ def _letter_name(character: str) -> str:
         name = words[3].lower()
         return name.capitalize() if words[1] == "CAPITAL" else name
     return f"u{ord(character):04x}"
-
-
-def _unlike(
-    allowed: _Allowed,
-    plain: str,
-    words: set[str],
-    used: set[str],
-    counts: dict[str, int],
-) -> str:
-    """Return a name, with the first number that makes it unlike all others."""
-    if plain.casefold() in words and not allowed.is_too_long(plain + allowed.filler):
-        plain += allowed.filler
-    result = plain
-    count = counts.get(plain, 1)
-    while allowed.key(result) in used or result.casefold() in words:
-        count += 1
-        end = f"{allowed.filler}{count}"
-        room = allowed.longest - len(end) if allowed.longest else len(plain)
-        result = plain[:room] + end
-    counts[plain] = count
-    return result
