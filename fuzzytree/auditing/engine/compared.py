@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Final, Literal, NamedTuple
@@ -220,7 +221,7 @@ class RulePairs:
             one, other = axis.function(strong), axis.function(weak)
             mine = one.lower if is_sure else one.upper
             theirs = other.upper if is_sure else other.lower
-            test = _is_no_stronger if is_strict else _is_weaker
+            test = _is_no_stronger if is_strict else operator.lt
             return _least(_values_where(axis, mine, theirs, test))
 
         return self._once(key, made)  # type: ignore[return-value]
@@ -613,10 +614,6 @@ def _reached_values(
     for number, (_, value, rival) in enumerate(at_knots(one, other)):
         if number or not axis.is_open:
             yield value, rival
-
-
-def _is_weaker(one: Fraction, other: Fraction) -> bool:
-    return one < other
 
 
 def _is_no_stronger(one: Fraction, other: Fraction) -> bool:
