@@ -630,7 +630,7 @@ def _same(operation: str) -> _Meaning:
     return meaning
 
 
-def _truth(test: _Meaning) -> _Meaning:
+def _truth(test: _Test) -> _Meaning:
     def meaning(n: Numbers[N], *operands: N) -> N:
         truth: N = test(n, *operands)
         return as_number(n, truth)
@@ -667,6 +667,7 @@ def _modulo(n: Numbers[N], a: N, b: N) -> N:
 
 
 _Meaning = Callable[..., Any]
+_Test = Callable[[Numbers[Any], Any], Any] | Callable[[Numbers[Any], Any, Any], Any]
 _OPERATIONS: Final[Mapping[str, str]] = {
     **{"negate": "negate", "abs": "absolute", "sqrt": "square_root"},
     **{"exp": "exponential", "log": "logarithm", "log10": "logarithm_10"},

@@ -99,15 +99,20 @@ def _seldom(n: Numbers[N], d: N) -> N:
     return n.where(n.at_most(d, 0.5), n.root(0.5 * d), high)
 
 
+def _fourth(n: Numbers[N], d: N) -> N:
+    del n
+    return square(square(d))
+
+
 _HEDGES: Mapping[Hedge, _Hedging] = {
     "any": lambda n, _: n.constant(1.0),
     "not": lambda _, d: 1.0 - d,
-    "very": lambda _, d: square(d),
+    "very": lambda _, d: d * d,
     "somewhat": lambda n, d: n.root(d),
     "extremely": _extremely,
     "seldom": _seldom,
-    "cubed": lambda _, d: square(d) * d,
-    "very very": lambda _, d: square(square(d)),
+    "cubed": lambda _, d: d * d * d,
+    "very very": _fourth,
     "plus": lambda n, d: n.power(d, 1.25),
     "minus": lambda n, d: n.power(d, 0.75),
     "cube root": lambda n, d: n.power(d, 1.0 / 3.0),
