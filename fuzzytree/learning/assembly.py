@@ -138,7 +138,10 @@ def assembled(
         keeps_flaws: Whether a polynomial that leaves [0, 1] or rises stays.
         supports: How many rows of the table reach each leaf.
     """
-    keys = [_key(split.axis, node) for node, split in enumerate(sketch.splits)]
+    keys = [
+        (-1, node) if axis.is_combined else (int(axis.features[0]), -1)
+        for node, axis in enumerate(split.axis for split in sketch.splits)
+    ]
     fit = _Fit(patterns, statistics, points, separate_sides, keeps_flaws)
     axes = _axis_sets(sketch, keys, fit)
     flanks, largest = _all_flanks(sketch, keys, axes)
@@ -174,11 +177,6 @@ def assembled(
 
 
 _Key = tuple[int, int]
-
-
-def _key(axis: SplitAxis, node: int) -> _Key:
-    """Return the key of an axis: the feature, or the node of a combination."""
-    return (-1, node) if axis.is_combined else (int(axis.features[0]), -1)
 
 
 def _added(parts: Sequence[SetRepairs]) -> SetRepairs:

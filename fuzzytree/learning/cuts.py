@@ -69,15 +69,19 @@ def _standard_cuts(
 ) -> SplitCuts:
     """Return the cuts for patterns ordered by mean, in units of the widest."""
     if len(means) > _ENVELOPE:
-        points = _neighbour_crossings(means, widths, groups)
-        borders = np.flatnonzero(np.diff(groups))
-        return SplitCuts(points, groups[np.concatenate([[0], borders + 1])])
+        left = np.flatnonzero(np.diff(groups))
+        right = left + 1
+        points = means[left] * widths[right] + means[right] * widths[left]
+        points = np.maximum.accumulate(points / (widths[left] + widths[right]))
+        return SplitCuts(points, groups[np.concatenate([[0], right])])
     points = _all_crossings(means, widths, groups)
     inner = (points[1:] + points[:-1]) / 2
     ends = points if len(points) else means
     probes = np.concatenate([[ends[0] - 10.0], inner, [ends[-1] + 10.0]])
     height = -0.5 * ((probes[:, None] - means) / widths) ** 2 - np.log(widths)
-    cuts = _merged(points, groups[height.argmax(axis=1)], 0)
+    owners = groups[height.argmax(axis=1)]
+    keep = np.flatnonzero(np.diff(owners))
+    cuts = SplitCuts(points[keep], owners[np.concatenate([[0], keep + 1])])
     cuts = _with_everybody(cuts, means, widths, groups)
     if keep_reversals:
         return cuts
@@ -101,16 +105,6 @@ def _with_everybody(
     return SplitCuts(points, np.unique(groups)[order])
 
 
-def _neighbour_crossings(
-    means: FloatArray, widths: FloatArray, groups: IntArray
-) -> FloatArray:
-    left = np.flatnonzero(np.diff(groups))
-    right = left + 1
-    points = means[left] * widths[right] + means[right] * widths[left]
-    points = points / (widths[left] + widths[right])
-    return np.maximum.accumulate(points)
-
-
 def _all_crossings(
     means: FloatArray, widths: FloatArray, groups: IntArray
 ) -> FloatArray:
@@ -125,12 +119,6 @@ def _all_crossings(
         q = -0.5 * (b + np.where(b < 0, -root, root))
         found = np.concatenate([means[i] + q / a, means[i] + c / q])
     return np.unique(found[np.isfinite(found)])
-
-
-def _merged(points: FloatArray, owners: IntArray, reversals: int) -> SplitCuts:
-    """Drop cuts within one owner, and cuts that do not increase."""
-    keep = np.flatnonzero(np.diff(owners))
-    return SplitCuts(points[keep], owners[np.concatenate([[0], keep + 1])], reversals)
 
 
 def _without_reversals(

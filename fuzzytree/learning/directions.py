@@ -75,7 +75,8 @@ def axis_towards(
     chosen = points[:, selected]
     direction: FloatArray | None
     if is_fine:
-        direction = _fisher_direction(chosen, sides, weights, rules.shrinkage)
+        means, scatter = _two_groups(chosen, sides, weights, rules.shrinkage)
+        direction = _solved(scatter, means[1] - means[0])
     else:
         direction = logistic_direction(chosen, sides, weights, 1.0)
     if direction is None:
@@ -144,14 +145,6 @@ def selected_columns(
         step = step - column * step[best]
         rest = rest - np.outer(column, rest[best])
     return np.array(selected or [0], np.int64)
-
-
-def _fisher_direction(
-    points: FloatArray, is_right: BoolArray, weights: FloatArray, shrinkage: float
-) -> FloatArray:
-    """Return W^-1 (mean of the right - mean of the left)."""
-    means, scatter = _two_groups(points, is_right, weights, shrinkage)
-    return _solved(scatter, means[1] - means[0])
 
 
 def _two_groups(

@@ -129,7 +129,9 @@ def _number(values: FloatArray, codes: IntArray) -> float:
     best = int(np.argmax(likely))
     own = _likelihood(gone, gone, classes)
     price = 0.5 * (len(np.unique(codes)) - 1) * math.log(len(codes))
-    below = _below(float(ordered[0]), float(ordered[-1]))
+    low, high = float(ordered[0]), float(ordered[-1])
+    step = math.ldexp(1.0, math.frexp(high - low)[1] - 2) if high > low else 1.0
+    below = low - step
     if math.isfinite(below) and own - likely[best] > price:
         return below
     return float(places[best])
@@ -139,12 +141,6 @@ def _likelihood(near: IntArray, gone: IntArray, classes: int) -> float:
     """Return the log-likelihood of classes by the shares of others, half a row more."""
     shares = np.bincount(near, minlength=classes) + 0.5
     return float(np.log(shares / shares.sum())[gone].sum())
-
-
-def _below(low: float, high: float) -> float:
-    """Return a place below a range, a quarter of its width away or more."""
-    step = math.ldexp(1.0, math.frexp(high - low)[1] - 2) if high > low else 1.0
-    return low - step
 
 
 def described(
@@ -172,12 +168,14 @@ def described(
         )
         missing = None if math.isnan(stand) else stand
         is_below = missing is not None and missing < least
-        terms = (
-            _of_categories(variable.terms, categories, 0 if missing != -1.0 else -1)
-            if categories
-            else _of_numbers(variable.terms, least if is_below else -math.inf)
-        )
-        renamed = dict(zip((t.name for t in variable.terms), terms, strict=True))
+        shown = [t.name for t in variable.terms]
+        if categories:
+            first = 0 if missing != -1.0 else -1
+            shown = [_category_name(t, categories, first) for t in variable.terms]
+        elif is_below:
+            shown = [MISSING if _ends(t)[1] < least else t.name for t in variable.terms]
+        terms = zip(variable.terms, _unlike(shown), strict=True)
+        renamed = {term.name: name for term, name in terms}
         names |= {(variable.name, old): new for old, new in renamed.items()}
         variables.append(
             replace(
@@ -207,13 +205,6 @@ def described(
     return replace(tree, variables=tuple(variables), nodes=nodes)
 
 
-def _of_categories(
-    terms: Sequence[Term], categories: Sequence[str], first: int
-) -> list[str]:
-    """Return the names of terms by the categories in their plateaus, from a place."""
-    return _unlike(_category_name(term, categories, first) for term in terms)
-
-
 def _category_name(term: Term, categories: Sequence[str], first: int) -> str:
     low, high = _ends(term)
     inside = [k for k in range(first, len(categories)) if low < k <= high]
@@ -221,11 +212,6 @@ def _category_name(term: Term, categories: Sequence[str], first: int) -> str:
     if len(inside) > _SHOWN:
         shown.append(f"{len(inside) - _SHOWN} more")
     return " or ".join(shown) or "no category"
-
-
-def _of_numbers(terms: Sequence[Term], least: float) -> list[str]:
-    """Return the names of terms, of which one below all numbers is `missing`."""
-    return _unlike(MISSING if _ends(t)[1] < least else t.name for t in terms)
 
 
 def _ends(term: Term) -> tuple[float, float]:

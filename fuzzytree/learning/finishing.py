@@ -97,7 +97,9 @@ def _joined(
         one = todo.pop()
         found = tree.splits[one] if one >= 0 else None
         if one < 0:
-            cuts.append(float(_cut(tree, ~one)))
+            split = tree.splits[~one]
+            assert split is not None  # its node is split
+            cuts.append(float(split.cuts[0]))
         elif (
             found is None or found.axis.is_combined or found.axis.features[0] != column
         ):
@@ -107,12 +109,6 @@ def _joined(
             todo += [right, ~one, left]
     owners = np.arange(len(cuts) + 1)
     return TreeSplit(axis, np.array(cuts), owners, ()), below
-
-
-def _cut(tree: BinaryTree, node: int) -> float:
-    split = tree.splits[node]
-    assert split is not None
-    return float(split.cuts[0])
 
 
 def _placed(split: TreeSplit, rows: TrainingRows, at: IntArray) -> TreeSplit:

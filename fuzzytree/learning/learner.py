@@ -227,7 +227,7 @@ class ArrayLearner:
         """
         ready = self._prepared()
         sample, moments = ready.sample, ready.moments
-        progress = progress or _silent
+        progress = progress or (lambda _text, _share: None)
         grow = self._paper if self.settings.mode == "paper" else self._default
         grown = grow(ready, progress)
         names = TermNames(self.name, self.columns, self.classes, self.units)
@@ -286,7 +286,11 @@ class ArrayLearner:
             sample, shares = sample.without_last_column()
             table = table.without_last_column()
         moments = table.statistics.moments(sample.units)
-        _check_columns(moments)
+        if not len(usable_features(moments)):
+            raise LearningError(
+                "cannot learn without a column that varies: every column is constant, "
+                "or so wide that its range overflows"
+            )
         costs = np.array([self.settings.costs.get(c, 1.0) for c in self.columns])
         counts = moments.counts if drops else self.statistics.counts()
         kept = np.bincount(sample.codes, minlength=len(self.classes))
@@ -380,7 +384,9 @@ class ArrayLearner:
             single_rows=int(np.count_nonzero(patterns.moments.counts == 1)),
             zero_spreads=made.zero_spreads,
             leaves=len(made.tree.leaves),
-            features_per_node=_features_per_node(grown.sketch),
+            features_per_node=tuple(
+                len(split.axis.features) for split in grown.sketch.splits
+            ),
             sets=made.sets,
             off_peak=made.repairs.off_peak,
             empty_centre=made.repairs.empty_centre,
@@ -435,14 +441,6 @@ _STYLES = {
     "mixed": "columns and combinations",
     "centres": "combinations between the classes",
 }
-
-
-def _silent(_: str, __: float) -> None:
-    """Report nothing."""
-
-
-def _features_per_node(sketch: Sketch) -> tuple[int, ...]:
-    return tuple(len(split.axis.features) for split in sketch.splits)
 
 
 def _check_names(
@@ -533,12 +531,4 @@ def check_rows(
     if len(present) == 1:
         raise LearningError(
             f"cannot learn from one class: every row is {classes[present[0]]!r}"
-        )
-
-
-def _check_columns(moments: Moments) -> None:
-    if len(usable_features(moments)) == 0:
-        raise LearningError(
-            "cannot learn without a column that varies: every column is constant, "
-            "or so wide that its range overflows"
         )

@@ -73,7 +73,11 @@ def grow(
         if found is None:
             place = ~len(sketch.leaves)
             sketch.leaves.append(chosen)
-            sketch.leaf_classes.append(_leaf_class(patterns, chosen, grown))
+            labels = patterns.labels[chosen]
+            if len(np.unique(labels)) > 1:
+                grown.inseparable += len(chosen)
+            totals = np.bincount(labels, weights=patterns.weights[chosen])
+            sketch.leaf_classes.append(int(totals.argmax()))
             settled += len(chosen)
             if progress is not None:
                 progress(settled / len(everything))
@@ -89,14 +93,6 @@ def grow(
     return grown
 
 
-def _leaf_class(patterns: Patterns, chosen: IntArray, grown: GrownTree) -> int:
-    labels = patterns.labels[chosen]
-    if len(np.unique(labels)) > 1:
-        grown.inseparable += len(chosen)
-    totals = np.bincount(labels, weights=patterns.weights[chosen])
-    return int(totals.argmax())
-
-
 def _split_at(
     patterns: Patterns,
     chosen: IntArray,
@@ -107,7 +103,9 @@ def _split_at(
     """Split by one feature; while none splits, the level rises and T falls to 0."""
     if len(chosen) < 2:
         return None
-    means, spreads, costs = _single_features(patterns, chosen, rules)
+    place, moments = np.ix_(chosen, patterns.usable), patterns.moments
+    means, spreads = moments.means[place], moments.spreads[place]
+    costs = rules.costs[patterns.usable]
     while True:
         limits = threshold(spreads, rules.l_max, level)
         found = most_powerful(
@@ -119,14 +117,6 @@ def _split_at(
             return None
         level += 1
         grown.levels_raised += 1
-
-
-def _single_features(
-    patterns: Patterns, chosen: IntArray, rules: GrowthRules
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    place = np.ix_(chosen, patterns.usable)
-    moments = patterns.moments
-    return moments.means[place], moments.spreads[place], rules.costs[patterns.usable]
 
 
 def _grouped_split(
@@ -162,13 +152,8 @@ def finished_split(
         cuts: In the axis' own unit.
         groups: The patterns of each branch.
     """
-    members = _members(patterns, np.concatenate(groups))
+    members = patterns.members(np.concatenate(groups))
+    members = members[:: 1 + len(members) // _NODE_ROWS]  # if they are very many
     rows, moved = patterns.rows[members], patterns.moved[members]
     placed = axis.settled(cuts, rows, moved, patterns.units)
     return TreeSplit(axis, placed.cuts, placed.owners, groups)
-
-
-def _members(patterns: Patterns, chosen: IntArray) -> IntArray:
-    """Return sample rows of some patterns, thinned evenly if they are very many."""
-    members = patterns.members(chosen)
-    return members[:: 1 + len(members) // _NODE_ROWS]

@@ -238,7 +238,8 @@ def clusters_of(rows: FloatArray, count: int) -> IntArray:
     """
     owners = np.zeros(len(rows), np.int64)
     for new in range(1, min(count, len(rows))):
-        totals = _inertias(rows, owners, new)
+        squares = ((rows - _centres(rows, owners, new)[owners]) ** 2).sum(axis=1)
+        totals = np.bincount(owners, squares, new)
         widest = int(totals.argmax())
         if totals[widest] <= 0:
             break
@@ -246,12 +247,6 @@ def clusters_of(rows: FloatArray, count: int) -> IntArray:
         owners[inside[_upper_half(rows[inside])]] = new
         owners = _settled(rows, owners, new + 1, rounds=5)
     return _compacted(_settled(rows, owners, int(owners.max(initial=0)) + 1))
-
-
-def _inertias(rows: FloatArray, owners: IntArray, size: int) -> FloatArray:
-    centres = _centres(rows, owners, size)
-    squares = ((rows - centres[owners]) ** 2).sum(axis=1)
-    return np.bincount(owners, squares, size).astype(np.float64)
 
 
 def _upper_half(rows: FloatArray) -> IntArray:

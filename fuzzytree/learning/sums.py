@@ -71,7 +71,7 @@ class Totals:
         start, unit = whole(origin, self.unit), self.unit - exponent
         return np.array(
             [
-                _mean(count, total, start, unit)
+                rounded_ratio(total - count * start, count, unit) if count else math.nan
                 for count, total in zip(self.counts, self.sums, strict=True)
             ]
         )
@@ -87,7 +87,14 @@ class Totals:
         """
         columns = zip(self.counts, self.sums, self.squares, strict=True)
         unit = self.unit - exponent
-        return np.array([_spread(*numbers, unit) for numbers in columns])
+        return np.array(
+            [
+                rounded_root(n * square - total**2, n * max(n - 1, 1), unit)
+                if n
+                else math.nan
+                for n, total, square in columns
+            ]
+        )
 
     @property
     def exponent(self) -> int:
@@ -99,16 +106,6 @@ class Totals:
         """Return `n Q - S^2` of a group, in units of `2**(2 unit)`; never negative."""
         total = self.sums[group]
         return self.counts[group] * self.squares[group] - total * total
-
-
-def _mean(count: int, total: int, start: int, unit: int) -> float:
-    return rounded_ratio(total - count * start, count, unit) if count else math.nan
-
-
-def _spread(count: int, total: int, square: int, unit: int) -> float:
-    if not count:
-        return math.nan
-    return rounded_root(count * square - total * total, count * max(count - 1, 1), unit)
 
 
 def whole(value: float, unit: int) -> int:
