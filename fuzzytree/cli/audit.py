@@ -201,7 +201,7 @@ def command(options: AuditOptions) -> int:
                 found,
                 _lines_of(material),
                 gone=lost,
-                is_coloured=_is_coloured(),
+                is_coloured=sys.stdout.isatty() and not os.environ.get("NO_COLOR"),
                 is_verbose=options.verbose,
                 is_whole=options.is_whole,
             )
@@ -259,10 +259,6 @@ def _lines_of(material: Material) -> list[str]:
     is_wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
     text = content.decode("utf-16" if is_wide else "utf-8-sig", "replace")
     return split_lines(text)
-
-
-def _is_coloured() -> bool:
-    return sys.stdout.isatty() and not os.environ.get("NO_COLOR")
 
 
 def _tell_domain(found: Audit, *, quiet: bool) -> None:

@@ -441,7 +441,12 @@ def progress_bar(
             if not work:  # none yet, or the end
                 return
             if not bars:
-                bars.append(_new_bar())
+                from rich.console import Console
+                from rich.progress import Progress
+
+                bars.append(Progress(console=Console(stderr=True), transient=True))
+                bars[0].add_task("", total=1.0)
+                bars[0].start()
             text, share = work[-1]
             shown = printable(text).replace("[", r"\[")  # what rich takes for a style
             task = bars[0].tasks[0]
@@ -464,13 +469,3 @@ def progress_bar(
             work.clear()
             for bar in bars:
                 bar.stop()
-
-
-def _new_bar() -> Progress:
-    from rich.console import Console
-    from rich.progress import Progress
-
-    bar = Progress(console=Console(stderr=True), transient=True)
-    bar.add_task("", total=1.0)
-    bar.start()
-    return bar

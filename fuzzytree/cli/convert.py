@@ -45,7 +45,6 @@ from fuzzytree.model import (
 if TYPE_CHECKING:
     from fuzzytree.checking import Proof
     from fuzzytree.model import ModelPath, Option
-    from fuzzytree.numerics import Certificate
 
 
 class ConvertOptions(WritingOptions):
@@ -218,6 +217,7 @@ def carry(
     if after:
         say(f"{label:<9}{after}{shows}", quiet=chosen.quiet)
     if chosen.as_json and chosen.output != "-":
+        bound = proof.certificate
         answer_json(
             {
                 **facts,
@@ -228,7 +228,8 @@ def carry(
                 "remarks": written.remarks,
                 "names": dict(written.names),
                 "proof": {"verdict": proof.verdict, "sentence": proof.sentence},
-                "certificate": _certificate_facts(proof.certificate),
+                "certificate": bound
+                and {"sentence": bound.sentence, **msgspec.to_builtins(bound)},
                 "coverage": proof.coverage,
                 "next": after if label == "next" and after else None,
             }
@@ -278,12 +279,6 @@ def _proof_row(proof: Proof) -> tuple[str, str, str]:
     if proof.verdict == "unproved":
         return "unproved", "", proof.sentence
     return "proved", proof.verdict, proof.sentence
-
-
-def _certificate_facts(found: Certificate | None) -> dict[str, object] | None:
-    if found is None:
-        return None
-    return {"sentence": found.sentence, **msgspec.to_builtins(found)}
 
 
 def next_check(*files: tuple[str, str], more: Sequence[str] = ()) -> str:

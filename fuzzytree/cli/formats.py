@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from fuzzytree.checking import Ability
-    from fuzzytree.exporters import Plugin
     from fuzzytree.model import Format
 
 
@@ -70,7 +69,10 @@ def command(options: FormatsOptions) -> None:
             {
                 "formats": [_facts(one, found[one.name], missing) for one in formats],
                 "runtimes": [report.runtime_facts(one, missing) for one in runtimes],
-                "plugins": [_plugin_facts(one) for one in plugins],
+                "plugins": [
+                    {"name": one.name, "package": one.package, "fault": one.fault}
+                    for one in plugins
+                ],
             }
         )
         return
@@ -141,7 +143,3 @@ def _facts(
         "abilities": found if is_known else [],
         "not_tried": "" if is_known else found,
     }
-
-
-def _plugin_facts(one: Plugin) -> dict[str, object]:
-    return {"name": one.name, "package": one.package, "fault": one.fault}

@@ -530,10 +530,13 @@ def _settings(options: LearnOptions) -> LearningSettings:
         for name in LearningSettings.__struct_fields__
         if getattr(options, name) is not None
     }
-    values["costs"] = {
-        column: _parsed("--cost", column, text, float)
-        for column, text in _pairs("--cost", options.costs)
-    }
+    costs = values["costs"] = {}
+    for column, text in _pairs("--cost", options.costs):
+        try:
+            costs[column] = float(text)
+        except ValueError as error:
+            text = f"--cost {column}: {text!r} is no number"
+            raise click.UsageError(text) from error
     with wrong_options():
         return LearningSettings(**values)
 
@@ -546,15 +549,6 @@ def _pairs(option: str, texts: Sequence[str]) -> list[tuple[str, str]]:
             raise click.UsageError(f"{option} {text!r}: is not COLUMN=VALUE")
         pairs.append((column, value))
     return pairs
-
-
-def _parsed(
-    option: str, name: str, text: str, kind: Callable[[str], int | float]
-) -> int | float:
-    try:
-        return kind(text)
-    except ValueError as error:
-        raise click.UsageError(f"{option} {name}: {text!r} is no number") from error
 
 
 def _summary(

@@ -35,7 +35,6 @@ from fuzzytree.files import open_atomically
 from fuzzytree.model import (
     FuzzySystem,
     FuzzyTree,
-    RuleBase,
     checkpoint,
     printable_json,
 )
@@ -104,6 +103,7 @@ def command(options: RunOptions) -> None:
     from 1; 0 is no rule.
     """
     from fuzzytree import api
+    from fuzzytree.runtimes import OnnxModel
     from fuzzytree.tables import rate_text
 
     suffix = Path(options.output).suffix.lower()
@@ -137,7 +137,8 @@ def command(options: RunOptions) -> None:
     source = table_source(options.table, options)
     name = "standard input" if options.table == "-" else options.table
     finish = _part_maker(options, name, reason, is_binary=is_binary)
-    tally, begin = _Tally(_has_status(found)), time.monotonic()
+    has_status = not isinstance(found, OnnxModel) or "status" in found.outputs
+    tally, begin = _Tally(has_status), time.monotonic()
     is_mixed = options.output == "-" and sys.stdout.isatty()
     with (
         _opened(options.output) as stream,
@@ -253,12 +254,6 @@ def _add(columns: Columns, more: Columns, name: str) -> None:
     columns.update(more)
 
 
-def _has_status(model: Document | OnnxModel) -> bool:
-    if isinstance(model, FuzzyTree | RuleBase | FuzzySystem):
-        return True
-    return "status" in model.outputs
-
-
 def _reasons(
     path: str, model: Document | OnnxModel
 ) -> Callable[[Batch, Predictions | Outputs], list[str]]:
@@ -307,7 +302,12 @@ def _table_writer(
 
         def write(table: pa.Table, name: str) -> None:
             if not files:
-                file = _new_writer(stream, table.schema, suffix)
+                import pyarrow as pa
+                import pyarrow.parquet as pq
+
+                is_parquet = suffix in _BINARY[:2]
+                begin = pq.ParquetWriter if is_parquet else pa.ipc.new_file
+                file = begin(stream, table.schema)
                 stack.callback(file.close)
                 files.append((file, table.schema))
             rows.append(_cast(table, files[0][1], name))
@@ -335,14 +335,6 @@ def _cast(table: pa.Table, schema: pa.Schema, name: str) -> pa.Table:
             f"{name}: columns have other types than in the files before it; leave out "
             f"--keep, or convert them: {error}"
         ) from error
-
-
-def _new_writer(stream: BinaryIO, schema: pa.Schema, suffix: str) -> Any:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    is_parquet = suffix in _BINARY[:2]
-    return (pq.ParquetWriter if is_parquet else pa.ipc.new_file)(stream, schema)
 
 
 class _Lines(list[str]):

@@ -18,7 +18,7 @@ from fuzzytree.cli.console import (
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.model import Coverage, Document, Reading
+    from fuzzytree.model import Document, Reading
 
 
 class ShowOptions(ResultOptions):
@@ -41,6 +41,8 @@ def command(options: ShowOptions) -> None:
     from pathlib import Path
 
     from fuzzytree import api, report
+    from fuzzytree.checking import coverage_of
+    from fuzzytree.model import FuzzySystem, loss_text
     from fuzzytree.runtimes import OnnxModel
 
     if Path(options.model).suffix.lower() == ".onnx":
@@ -57,36 +59,19 @@ def command(options: ShowOptions) -> None:
             answer("\n".join(report.fact_lines(facts)))
         return
     found = api.read(options.model)
-    coverage = _coverage(found.model)
+    model = found.model
+    coverage = coverage_of(model) if isinstance(model, FuzzySystem) else None
     if options.picture is not None:
-        _draw(found.model, options.picture)
+        _draw(model, options.picture)
         say(f"wrote    {options.picture}", quiet=options.quiet)
-    _tell(found, coverage, quiet=options.quiet)
-    if options.as_json:
-        answer_json({**_facts(found), "coverage": coverage})
-    else:
-        answer("\n".join(report.model_lines(found.model)))
-
-
-def _coverage(model: Document) -> Coverage | None:
-    """Return which rules of a fuzzy system fire in probes; None for other models."""
-    from fuzzytree.model import FuzzySystem
-
-    if not isinstance(model, FuzzySystem):
-        return None
-    from fuzzytree.checking import coverage_of
-
-    return coverage_of(model)
-
-
-def _tell(found: Reading, coverage: Coverage | None, *, quiet: bool) -> None:
-    """Say on stderr what is not shown."""
-    from fuzzytree.model import loss_text
-
     for loss in found.losses:
         say(f"lost     {loss_text(loss)}")
     for remark in (*found.remarks, *(coverage.sentences if coverage else ())):
-        say(f"remark   {remark}", quiet=quiet)
+        say(f"remark   {remark}", quiet=options.quiet)
+    if options.as_json:
+        answer_json({**_facts(found), "coverage": coverage})
+    else:
+        answer("\n".join(report.model_lines(model)))
 
 
 def _draw(model: Document, picture: str) -> None:
