@@ -93,7 +93,7 @@ def audit_lines(
         is_whole: Whether every answer is printed one by one.
     """
     audit = as_in_file(audit)
-    paint = _painted if is_coloured else _plain
+    paint: _Paint = _painted if is_coloured else lambda text, _: text
     is_verbose |= is_whole
     yield from wrapped(audit_verdict(audit, gone), WIDTH, rest="  ")
     yield from _head(audit, is_verbose=is_verbose)
@@ -269,10 +269,6 @@ def _evidence(
 def _painted(text: str, key: str) -> str:
     code = _COLOURS.get(key)
     return text if code is None else f"\x1b[{code}m{text}\x1b[0m"
-
-
-def _plain(text: str, _: str) -> str:
-    return text
 
 
 def _facts(answer: AuditAnswer) -> Iterator[tuple[str, str]]:

@@ -76,24 +76,18 @@ def _cards(
     axes: Sequence[Axis], model: Audited, data: Data | None, name: str
 ) -> Iterator[tuple[Axis, Markup, list[str]]]:
     """Yield variables with their pictures and their terms in words."""
+    variables = {one.name: one for one in model.variables}
     for place, axis in enumerate(axes[:MOST_VARIABLES]):
-        lines = _in_words(model, axis.name)
+        lines = [
+            f"{term.name}: {curve_text(term.function, model.inputs)}"
+            for term in variables[axis.name].terms[:_MOST_TERMS]
+        ]
         if axis.parts:
             said = sum_text(axis.parts)
             lines.append(f"{axis.name} = {said}")
         if axis.undrawn:
             lines.append(f"not drawn: {', '.join(axis.undrawn)}")
         yield axis, terms_picture(axis, data, f"{name}{place}"), lines
-
-
-def _in_words(model: Audited, name: str) -> list[str]:
-    """Return the terms of a variable in words."""
-    variables = model.variables
-    own = next(one for one in variables if one.name == name)
-    return [
-        f"{term.name}: {curve_text(term.function, model.inputs)}"
-        for term in own.terms[:_MOST_TERMS]
-    ]
 
 
 def rules_section(
@@ -103,7 +97,8 @@ def rules_section(
     rules = viewed.rules.rules if viewed.rules else ()
     classes = viewed.rules.classes if viewed.rules else ()
     is_supported = any(rule.support is not None for rule in rules)
-    supported = {k: answer for answer in answers for k in _of_rows(answer)}
+    of_rows = (one for one in answers if one.code == "FT701" and len(one.rules) == 1)
+    supported = {one.rules[0]: one for one in of_rows}
     names = [*dict.fromkeys(m.name for one in supported.values() for m in one.measures)]
     is_shared = any(isinstance(one.state, Sampled) for one in supported.values())
     head = ["rule", "sentence", *(["training rows"] if is_supported else []), *names]
@@ -115,7 +110,8 @@ def rules_section(
         row: list[str] = [part("rule_id", name, k), part("rule", rule, classes)]
         if is_supported:
             row.append("-" if rule.support is None else str(rule.support))
-        row += _measured(answer, names)
+        values = {one.name: one.value for one in answer.measures} if answer else {}
+        row += [number(values[name]) if name in values else "-" for name in names]
         if is_shared:
             row.append(_confidence(answer))
         rows.append([*row, links.get(k, "-")])
@@ -160,17 +156,6 @@ def _notes(viewed: AuditView) -> Iterator[tuple[str, str]]:
     if weights:
         said = "The strengths of these are multiplied by their weights: "
         yield "caption", said + ", ".join(weights[:MOST_RULES])
-
-
-def _of_rows(answer: AuditAnswer) -> Iterator[int]:
-    """Yield the rule that an answer about rows is about."""
-    if answer.code == "FT701" and len(answer.rules) == 1:
-        yield answer.rules[0]
-
-
-def _measured(answer: AuditAnswer | None, names: Sequence[str]) -> list[str]:
-    known = {one.name: one.value for one in answer.measures} if answer else {}
-    return [number(known[name]) if name in known else "-" for name in names]
 
 
 def _confidence(answer: AuditAnswer | None) -> str:

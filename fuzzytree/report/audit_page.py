@@ -107,7 +107,9 @@ def _sections(
     scene = Scene(axes, viewed)
     shown = findings_section(findings, scene, audit.accepted)
     yield "findings", "Findings", shown
-    yield "questions", "All questions", _questions(audit)
+    asked, unasked = audit.answers[:MOST_QUESTIONS], [*gathered(audit.unasked)]
+    shown = part("questions", audit, SUMMARY, [*summary_rows(audit)], unasked, asked)
+    yield "questions", "All questions", shown
     if agreement is not None:
         yield "agreement", "Agreement", part("agreement", agreement)
     if stability is not None:
@@ -125,12 +127,6 @@ def _links(findings: Sequence[AuditAnswer]) -> dict[int, Markup]:
         for k in dict.fromkeys(answer.rules):
             about.setdefault(k, {}).setdefault(answer.code, []).append(name)
     return {k: part("links", codes) for k, codes in about.items()}
-
-
-def _questions(audit: Audit) -> Markup:
-    shown = audit.answers[:MOST_QUESTIONS]
-    unasked = [*gathered(audit.unasked)]
-    return part("questions", audit, SUMMARY, [*summary_rows(audit)], unasked, shown)
 
 
 def _command(answers: Sequence[AuditAnswer]) -> str:

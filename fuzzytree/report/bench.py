@@ -47,7 +47,8 @@ def study_lines(study: Study, *, is_verbose: bool = False) -> Iterator[str]:
         study: The study.
         is_verbose: Whether to print every table, omission and advice.
     """
-    advice = study.advice[-1] if study.advice else _nothing(study)
+    nothing = "measured" if study.points else "nothing could be measured"
+    advice = study.advice[-1] if study.advice else nothing
     yield from wrapped(advice, _WIDTH, rest="  ")
     yield f"{study.model}: {study.data}; {study.seconds:.0f} s"
     names = {point.name for point in study.points}
@@ -66,10 +67,6 @@ def study_lines(study: Study, *, is_verbose: bool = False) -> Iterator[str]:
     if names:
         yield f"{counted(len(names), 'candidate')} left out"
     yield "--verbose lists every time, error, omission and advice"
-
-
-def _nothing(study: Study) -> str:
-    return "measured" if study.points else "nothing could be measured"
 
 
 def _unbeaten(study: Study) -> Iterator[tuple[str, ...]]:

@@ -12,7 +12,6 @@ from fuzzytree.model import (
     Activation,
     Band,
     Binary,
-    Branch,
     Curve,
     Document,
     Formula,
@@ -210,20 +209,18 @@ def tree_lines(tree: FuzzyTree) -> Iterator[str]:
         is_last = position == len(node.branches) - 1
         corner, rail = ("└─ ", "   ") if is_last else ("├─ ", "│  ")
         text = f"{' or '.join(branch.terms)} ({taken(node, position)})"
-        yield f"{indent}{corner}{text}: {_end_text(tree, branch, parts)}"
         if branch.node is not None:
-            todo += _branches(tree.nodes[branch.node - 1], indent + rail)
+            below = tree.nodes[branch.node - 1]
+            end = _node_text(below, parts)
+            todo += _branches(below, indent + rail)
+        else:
+            leaf = branch.leaf or 1
+            end = _leaf_text(leaf, tree.leaves[leaf - 1])
+        yield f"{indent}{corner}{text}: {end}"
 
 
 def _branches(node: Node, indent: str) -> list[tuple[Node, int, str]]:
     return [(node, k, indent) for k in reversed(range(len(node.branches)))]
-
-
-def _end_text(tree: FuzzyTree, branch: Branch, parts: dict[str, int]) -> str:
-    if branch.node is not None:
-        return _node_text(tree.nodes[branch.node - 1], parts)
-    position = branch.leaf or 1
-    return _leaf_text(position, tree.leaves[position - 1])
 
 
 def _node_text(node: Node, parts: dict[str, int]) -> str:

@@ -103,16 +103,12 @@ def _graph_lines(graphs: Sequence[Graph]) -> Iterator[str]:
     for graph in graphs:
         if graph.because or graph.left_out:
             yield f"{graph.representation}: {_operators(graph.contents.operators)}"
-            yield from _because_lines(graph)
-
-
-def _because_lines(graph: Graph) -> Iterator[str]:
-    for one in graph.because:
-        yield f"  for {one.what}: {_because_text(one)}"
-    for one in graph.on_request:
-        yield f"  {one.what} would add: {_because_text(one)}"
-    if graph.left_out:
-        yield f"  nothing for {', '.join(graph.left_out)}"
+            for one in graph.because:
+                yield f"  for {one.what}: {_because_text(one)}"
+            for one in graph.on_request:
+                yield f"  {one.what} would add: {_because_text(one)}"
+            if graph.left_out:
+                yield f"  nothing for {', '.join(graph.left_out)}"
 
 
 def _because_text(one: Because) -> str:

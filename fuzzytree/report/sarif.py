@@ -47,8 +47,23 @@ def sarif_text(audit: Audit, baseline: Mapping[str, str] | None = None) -> str:
             }
         },
         "columnKind": "unicodeCodePoints",
-        "invocations": [_invocation(audit)],
-        "artifacts": [*_artifacts(audit)],
+        "invocations": [
+            {
+                "executionSuccessful": audit.is_complete,
+                "toolExecutionNotifications": [
+                    {"level": "note", "message": {"text": text}}
+                    for text in audit.unasked
+                ],
+            }
+        ],
+        "artifacts": [
+            {
+                "location": {"uri": _uri(source.name)},
+                "hashes": {"sha-256": source.sha256},
+            }
+            for source in (audit.file, audit.data)
+            if source is not None
+        ],
         "results": results,
         "properties": {
             "model": audit.model,
@@ -65,18 +80,15 @@ def sarif_text(audit: Audit, baseline: Mapping[str, str] | None = None) -> str:
 
 
 def _rule(code: Code) -> _Json:
+    words = "".join(c if c.isalnum() else " " for c in code.title).split()
     return {
         "id": code.code,
-        "name": "".join(word.capitalize() for word in _words(code.title)),
+        "name": "".join(map(str.capitalize, words)),
         "shortDescription": {"text": code.title},
         "fullDescription": {"text": code.what or code.title},
         "help": {"text": f"{code.why}\n\n{code.remedy}".strip() or code.title},
         "defaultConfiguration": {"level": SEVERITIES[code.severity]},
     }
-
-
-def _words(title: str) -> list[str]:
-    return "".join(c if c.isalnum() else " " for c in title).split()
 
 
 def _result(
@@ -146,23 +158,6 @@ def _locations(
 def _uri(path: str) -> str:
     """Return a path as the reference that it is in a repository."""
     return quote(path, safe="/")
-
-
-def _artifacts(audit: Audit) -> Iterator[_Json]:
-    for source in (audit.file, audit.data):
-        if source is not None:
-            yield {
-                "location": {"uri": _uri(source.name)},
-                "hashes": {"sha-256": source.sha256},
-            }
-
-
-def _invocation(audit: Audit) -> _Json:
-    notes = [{"level": "note", "message": {"text": text}} for text in audit.unasked]
-    return {
-        "executionSuccessful": audit.is_complete,
-        "toolExecutionNotifications": notes,
-    }
 
 
 _COMMANDS: Mapping[Severity, str] = {

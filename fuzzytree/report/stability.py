@@ -40,7 +40,10 @@ def stability_lines(study: Stability, *, is_verbose: bool = False) -> Iterator[s
         yield f"runtimes: {', '.join(study.runtimes) or 'none'}"
     yield from aligned([CRITERION, *map(criterion_row, study.criteria)])
     for one in study.criteria:
-        yield from _detail(one, is_verbose=is_verbose)
+        if is_verbose or one.verdict == "FAILS":
+            yield from (f"{one.code}: {text}" for text in one.detail)
+        if is_verbose:
+            yield from (f"{one.code}: not tried: {text}" for text in one.skipped)
     yield from _inputs(study, is_verbose=is_verbose)
     if is_verbose and study.offsets:
         yield from _offset_lines(study.offsets)
@@ -93,13 +96,6 @@ def criterion_row(one: Criterion) -> tuple[str, ...]:
     worst = "-" if one.worst is None else f"{one.worst:.2g}"
     verdict = one.verdict.replace("holds", "passes")
     return one.code, one.title, cases, worst, verdict
-
-
-def _detail(one: Criterion, *, is_verbose: bool) -> Iterator[str]:
-    if is_verbose or one.verdict == "FAILS":
-        yield from (f"{one.code}: {text}" for text in one.detail)
-    if is_verbose:
-        yield from (f"{one.code}: not tried: {text}" for text in one.skipped)
 
 
 def _stiff_row(one: Stiff) -> tuple[str, ...]:

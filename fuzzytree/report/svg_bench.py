@@ -153,7 +153,12 @@ def work_precision(study: Study, *, rows: int, threads: int = 1) -> Picture:
         if point.kind == "floor"
     ]
     panels = panels_of(marks, [time for _, time in floors])
-    title, base = _title(study, rows, threads), panels[-1].y.start
+    base = panels[-1].y.start
+    early = "" if study.is_complete else " (ended early)"
+    title = (
+        f"{study.model}: error against run time, {rows:,} row"
+        f"{'' if rows == 1 else 's'} a call, {counted(threads, 'thread')}{early}"
+    )
     machine = study.machine
     place = f"{machine.processor}, {counted(machine.cores, 'core')}, {machine.system}"
     drawn = [
@@ -308,14 +313,6 @@ def _times(panel: Panel) -> Iterator[Markup]:
 
 def _powers(x: Scale) -> range:
     return range(math.ceil(x.low), math.floor(x.high) + 1)
-
-
-def _title(study: Study, rows: int, threads: int) -> str:
-    early = "" if study.is_complete else " (ended early)"
-    return (
-        f"{study.model}: error against run time, {rows:,} row"
-        f"{'' if rows == 1 else 's'} a call, {counted(threads, 'thread')}{early}"
-    )
 
 
 def _legend(

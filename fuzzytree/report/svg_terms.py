@@ -98,7 +98,12 @@ def terms_picture(
     parts += axis_marks(x, y.start)
     high = y.start + 22.0
     title = f"The terms of {axis.title}"
-    return mark("svg", WIDE, high, name, title, _description(axis), parts)
+    terms = ", ".join(curve.name for curve in drawn) or "none"
+    domain = ""
+    if axis.low is not None and axis.high is not None:
+        domain = f"; the domain is {number(axis.low)} to {number(axis.high)}"
+    about = f"Degrees from 0 to 1 over the values{domain}; terms: {terms}"
+    return mark("svg", WIDE, high, name, title, about, parts)
 
 
 def _curves(
@@ -110,14 +115,6 @@ def _curves(
         look = "curve faint" if is_faint else "curve"
         dashes = DASHES[place % len(DASHES)]
         yield mark("curve", curve.name, polyline(curve, x, y), look, dashes)
-
-
-def _description(axis: Axis) -> str:
-    terms = ", ".join(curve.name for curve in axis.curves[:MOST_CURVES]) or "none"
-    domain = ""
-    if axis.low is not None and axis.high is not None:
-        domain = f"; the domain is {number(axis.low)} to {number(axis.high)}"
-    return f"Degrees from 0 to 1 over the values{domain}; terms: {terms}"
 
 
 def outside(axis: Axis, x: Scale, top: float, base: float) -> Iterator[Markup]:

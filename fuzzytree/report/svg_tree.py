@@ -167,20 +167,15 @@ def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
         if above:
             above.below.append(box)
         boxes.append(box)
-    _add_up(boxes)
+    for box in reversed(boxes):  # what is not known of a node its leaves show
+        reached = [below.rows for below in box.below if below.rows is not None]
+        if box.rows is None and box.below and len(reached) == len(box.below):
+            box.rows = sum(reached)
     return boxes
 
 
 def _count(box: Box, counts: Counts) -> None:
     box.rows, box.counts = sum(counts), counts
-
-
-def _add_up(boxes: Sequence[Box]) -> None:
-    """Give each node whose rows are not known those of the leaves behind it."""
-    for box in reversed(boxes):
-        reached = [below.rows for below in box.below if below.rows is not None]
-        if box.rows is None and box.below and len(reached) == len(box.below):
-            box.rows = sum(reached)
 
 
 def _branch_words(node: Node, place: int) -> str:
@@ -219,7 +214,9 @@ def _drawn(box: Box) -> Markup:
     rx = 14.0 if is_leaf else 4.0
     room = (_WIDE - 20.0) / (LETTER * 13.0)
     rows = "" if is_leaf else _rows_text(box)
-    title = [box.branch, box.title, box.note, rows, _counts_text(box.counts)]
+    counts = ", ".join(map(str, box.counts))
+    counts = f"rows by class: {counts}" if counts else ""
+    title = [box.branch, box.title, box.note, rows, counts]
     marks = [
         mark("rect", left, top, _WIDE, _HIGH, f"box{own}", rx),
         mark("words", left + 2, top - 6, cut(box.branch, _WIDE / 6.1), "small"),
@@ -232,10 +229,6 @@ def _drawn(box: Box) -> Markup:
 
 def _rows_text(box: Box) -> str:
     return "" if box.rows is None else counted(box.rows, "row")
-
-
-def _counts_text(counts: Counts) -> str:
-    return f"rows by class: {', '.join(map(str, counts))}" if counts else ""
 
 
 def _bar(counts: Counts, left: float, top: float, wide: float) -> Iterator[Markup]:
