@@ -202,11 +202,14 @@ def accuracy(
             categories=table.categories,
             weights=None if table.row_weights is None else table.row_weights[kept],
         )
-        values = _values(learnt.tree, table, test)
-        rules, predicted = _answered(learnt.tree, table, values)
-        if groups is not None and learnt.tree.sets:
-            weak.append(_is_weak(learnt.tree, values, rules))
-        right = predicted == table.codes[test]
+        tree = learnt.tree
+        places = [table.columns.index(name) for name in tree.inputs]
+        values = table.values[np.ix_(places, test)]
+        rules = baseline().load(tree)(values).rule
+        if groups is not None and tree.sets:
+            weak.append(_is_weak(tree, values, rules))
+        ends = [-1, *(table.classes.index(leaf.label) for leaf in tree.leaves)]
+        right = np.array(ends)[rules] == table.codes[test]
         weight = None if weights is None else weights[test]
         shares.append(float(np.average(right, weights=weight)))
     if not shares:
@@ -309,24 +312,6 @@ def sampled(codes: IntArray, most: int, seed: int) -> IntArray:
 def _by_class(codes: IntArray, seed: int) -> npt.NDArray[np.intp]:
     shuffled = np.random.default_rng(seed).permutation(len(codes))
     return shuffled[np.argsort(codes[shuffled], kind="stable")]
-
-
-def _values(tree: FuzzyTree, table: Table, rows: IntArray) -> FloatArray:
-    """Return what a tree needs of some rows: shape (inputs, rows)."""
-    position = {name: k for k, name in enumerate(table.columns)}
-    chosen = np.array([position[name] for name in tree.inputs], np.int64)
-    values: FloatArray = table.values[np.ix_(chosen, rows)]
-    return values
-
-
-def _answered(
-    tree: FuzzyTree, table: Table, values: FloatArray
-) -> tuple[IntArray, IntArray]:
-    """Return the leaf of each row, and the code of its class; 0 and -1 for none."""
-    code = {label: k for k, label in enumerate(table.classes)}
-    ends = np.array([-1, *(code[leaf.label] for leaf in tree.leaves)], np.int64)
-    found = baseline().load(tree)(values).rule
-    return found, ends[found]
 
 
 def _is_weak(tree: FuzzyTree, values: FloatArray, rules: IntArray) -> BoolArray:

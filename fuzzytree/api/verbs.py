@@ -156,7 +156,7 @@ def learn(
         warnings.warn(f"{rows.name}: {column} has {text}", stacklevel=2)
     return learn_table(
         result,
-        name=name or _name_of(table),
+        name=name or printable(stem_of(path_of(table) or "")) or "tree",
         units=units or {},
         settings=chosen,
         progress=progress,
@@ -203,11 +203,6 @@ def learn_table(
     )
     tree = with_label_type(learnt.tree, table.label_type)
     return msgspec.structs.replace(learnt, tree=tree)
-
-
-def _name_of(table: object) -> str:
-    path = path_of(table)
-    return (printable(stem_of(path)) if path else "") or "tree"
 
 
 def predict(frame: Frame, model: ModelSource) -> Frame:
@@ -483,11 +478,11 @@ def bench(
         >>> [point.question for point in study.points]
         ['tree', 'relative rules', 'raw rules']
     """
-    first = _model_of(model, "bench")
+    first, path = _model_of(model, "bench"), path_of(data)
     return benchmarking.bench(
         first,
         values=rows_of(data, first),
-        data=_data_name(data),
+        data=Path(path).name if path else "the table",
         select=select,
         skip=skip,
         plan=settings,
@@ -505,11 +500,6 @@ def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:
         kind = checking.CALLED[kind_of(result)]
         raise TypeError(f"{verb} takes a tree, and {result.name} is a {kind}")
     return result
-
-
-def _data_name(data: object) -> str:
-    path = path_of(data)
-    return Path(path).name if path else "the table"
 
 
 def audit(
@@ -617,7 +607,8 @@ def _model_and_file(
     """Return a model, and what is known of its file if it is the path of one."""
     if not isinstance(model, str | os.PathLike):
         return checking.as_model(model), None
-    file = auditing.model_file(os.fspath(model), _bytes_of(model))
+    checking.refuse_unreadable(checking.format_of(model), os.fspath(model))
+    file = auditing.model_file(os.fspath(model), read_bounded(model))
     return checking.load_content(file.content, file.name, allow_loss=allow_loss), file
 
 
@@ -642,16 +633,6 @@ def _readable_twice(data: object) -> tuple[object, str | None]:
     if isinstance(data, TableSource):
         return msgspec.structs.replace(data, source=content), name
     return content, name
-
-
-def _bytes_of(path: str | os.PathLike[str]) -> bytes:
-    """Return the content of a model's file.
-
-    Raises:
-        ReadError: If it cannot be read, or is in a format that only others read.
-    """
-    checking.refuse_unreadable(checking.format_of(path), os.fspath(path))
-    return read_bounded(path)
 
 
 def _source_of(data: object, name: str | None = None) -> auditing.SourceFile | None:

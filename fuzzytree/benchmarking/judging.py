@@ -108,16 +108,12 @@ class CandidateJudge:
         """Return the rows of the study, and rows aimed at the model's edges."""
         if question not in self.samples:
             model = self.forms[question]
-            edges = _edges(model)
+            edges = probe_values(model, min(MOST_PROBES, _most_rows(model)))
             self.samples[question] = (
                 ExactSample(model, self.values, decide(model, self.values)),
                 ExactSample(model, edges, decide(model, edges)),
             )
         return self.samples[question]
-
-
-def _edges(model: Model) -> FloatArray:
-    return probe_values(model, min(MOST_PROBES, _most_rows(model)))
 
 
 def measured_error(

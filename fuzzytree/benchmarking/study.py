@@ -137,8 +137,13 @@ def bench(
         values, origin = made_rows(model, count, seed=plan.seed)
         text = _data_text(f"{_rows(count)} {origin}", count, plan)
     else:
-        _check(model, values)
+        width = len(model.inputs)
+        if values.ndim != 2 or values.shape[0] != width:
+            text = f"values must have shape ({width}, rows), not {values.shape}"
+            raise ValueError(text)
         count = values.shape[1]
+        if not count:
+            raise ValueError("there are no rows to answer; give at least one")
         text = _data_text(f"{data or 'a table'}, {_rows(count)}", count, plan)
     candidates, omitted = gather(model, values, plan.peers)
     kept, left = chosen(candidates, as_names(select), as_names(skip))
@@ -151,14 +156,6 @@ def bench(
         plan=plan,
         progress=progress,
     )
-
-
-def _check(model: Model, values: FloatArray) -> None:
-    width = len(model.inputs)
-    if values.ndim != 2 or values.shape[0] != width:
-        raise ValueError(f"values must have shape ({width}, rows), not {values.shape}")
-    if not values.shape[1]:
-        raise ValueError("there are no rows to answer; give at least one")
 
 
 def _rows(count: int) -> str:
