@@ -16,7 +16,6 @@ from fuzzytree.cells import checked_weights, numbers_only
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import (
     ArrayLearner,
-    ClassWeight,
     LearningReport,
     LearningSettings,
     importances,
@@ -360,11 +359,16 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     ) -> None:
         self.classes_ = classes
         names = [str(label) for label in classes]
+        chosen: dict[str, Any] = self.get_params(deep=False)
+        chosen["costs"] = self.costs or {}
+        if isinstance(self.class_weight, Mapping):  # by names in the tree
+            weights = self.class_weight.items()
+            chosen["class_weight"] = {str(label): weight for label, weight in weights}
         self._learner = ArrayLearner(
             self._columns(),
             names,
             dict.fromkeys(dates, DATE_UNIT),
-            settings=self._settings(),
+            settings=LearningSettings(**chosen),
             categories=categories or {},
         )
 
@@ -386,8 +390,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             ValueError: If X does not fit the table of `fit`, or a value is so large
                 that a combination of columns overflows.
         """
-        rules = self.apply(X)
-        return self.classes_[self._class_of_rule()[rules - 1]]
+        rules, tree = self.apply(X), self.tree_
+        codes = [tree.classes.index(leaf.label) for leaf in tree.leaves]
+        return self.classes_[np.array(codes, np.int64)[rules - 1]]
 
     def apply(self, X: npt.ArrayLike) -> IntArray:
         """Return the number of the leaf of each row: the rule that answers, from 1.
@@ -532,12 +537,6 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         if "tree_" in state:
             self._run = _prepared(self.tree_)
 
-    def _settings(self) -> LearningSettings:
-        chosen: dict[str, Any] = self.get_params(deep=False)
-        chosen["costs"] = self.costs or {}
-        chosen["class_weight"] = _by_name(self.class_weight)
-        return LearningSettings(**chosen)
-
     def _columns(self) -> list[str]:
         names = getattr(self, "feature_names_in_", None)
         if names is None:
@@ -573,17 +572,6 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 f"of columns overflows ({len(overflown)} such rows)"
             )
         return outcome
-
-    def _class_of_rule(self) -> IntArray:
-        number = {name: k for k, name in enumerate(self.tree_.classes)}
-        return np.array([number[leaf.label] for leaf in self.tree_.leaves], np.int64)
-
-
-def _by_name(weights: LabelWeight) -> ClassWeight:
-    """Return weights of classes by their names in the tree."""
-    if isinstance(weights, Mapping):
-        return {str(label): weight for label, weight in weights.items()}
-    return weights
 
 
 def _paths(tree: FuzzyTree) -> list[tuple[int, ...]]:

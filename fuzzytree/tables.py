@@ -593,7 +593,11 @@ class LearningRows:
             return [first.columns.index(column) for column in self.names]
         others = [self.target] if self._codes is None else []
         others += [] if self._weight is None else [self._weight]
-        chosen = _learnt_columns(first, [*others, *self._ignore])
+        left_out = dict.fromkeys([*others, *self._ignore])
+        _refuse_absent(first, [*left_out], "")
+        chosen = [k for k, name in enumerate(first.columns) if name not in left_out]
+        if not chosen:
+            raise TableError(f"{first.name} has no column to learn from")
         unnamed = [k for k in chosen if not first.written[k].strip()]
         self._counts = dict.fromkeys(unnamed, frozenset({0, 1}))
         self.names = tuple(first.columns[k] for k in chosen if k not in unnamed)
@@ -1256,15 +1260,6 @@ def _some(names: Iterable[str]) -> list[str]:
     """Return the first few of many names, and three dots for the others."""
     result = list(itertools.islice(names, _MOST_NAMES + 1))
     return [*result[:_MOST_NAMES], "..."] if len(result) > _MOST_NAMES else result
-
-
-def _learnt_columns(piece: TablePiece, others: Sequence[str]) -> list[int]:
-    _refuse_absent(piece, others, "")
-    left_out = frozenset(others)
-    chosen = [k for k, column in enumerate(piece.columns) if column not in left_out]
-    if not chosen:
-        raise TableError(f"{piece.name} has no column to learn from")
-    return chosen
 
 
 def _needed_columns(

@@ -297,11 +297,6 @@ def _write_page(found: Audit, material: Material, page: str) -> None:
 
 def _fails(found: Audit, least: FailOn | None) -> bool:
     """Return whether something is found of at least a severity."""
-    grave = {
-        "error": ("error",),
-        "warning": ("error", "warning"),
-        "info": ("error", "warning", "info"),
-        "never": (),
-    }
-    failing = grave[least or "warning"]
+    grades = ("never", "error", "warning", "info")
+    failing = grades[: grades.index(least or "warning") + 1]
     return any(answer.severity in failing for answer in found.open_findings)

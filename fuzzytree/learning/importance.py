@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from fuzzytree.learning.nodes import information
-from fuzzytree.learning.units import FloatArray
 from fuzzytree.model import FuzzyTree, Variable
 
 
@@ -31,7 +30,11 @@ def importances(tree: FuzzyTree) -> dict[str, float]:
     """
     variables = {variable.name: variable for variable in tree.variables}
     result = dict.fromkeys(tree.columns or tree.inputs, 0.0)
-    leaves = np.array([_rows_of_leaf(tree, k) for k in range(len(tree.leaves))])
+    shares = [
+        leaf.probabilities or [float(name == leaf.label) for name in tree.classes]
+        for leaf in tree.leaves
+    ]
+    leaves = np.array(shares) * [[leaf.support or 0] for leaf in tree.leaves]
     inside = np.zeros((len(tree.nodes), len(tree.classes)))
     for number in reversed(range(len(tree.nodes))):  # parents stand before children
         node = tree.nodes[number]
@@ -49,13 +52,6 @@ def importances(tree: FuzzyTree) -> dict[str, float]:
             result[name] += max(gain, 0.0) * share
     total = sum(result.values())
     return {name: gain / total if total else 0.0 for name, gain in result.items()}
-
-
-def _rows_of_leaf(tree: FuzzyTree, number: int) -> FloatArray:
-    """Return how many rows of each class reach a leaf, by its probabilities."""
-    leaf = tree.leaves[number]
-    shares = np.array([float(name == leaf.label) for name in tree.classes])
-    return np.array(leaf.probabilities or shares) * (leaf.support or 0)
 
 
 def _shares(variable: Variable, known: Mapping[str, Variable]) -> dict[str, float]:
