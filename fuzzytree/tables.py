@@ -98,7 +98,6 @@ Only = frozenset[str] | None
 S = TypeVar("S")
 T = TypeVar("T")
 _Coded: TypeAlias = tuple[IntArray, list[tuple[str, bool]], str]
-_Faults = dict[str, tuple[str, str, int]]  # where the first is, its text, how many
 
 _CSV = (".csv", ".csv.gz", ".csv.zst")
 SUFFIXES = (*_CSV, ".xlsx", ".parquet", ".pq", ".arrow", ".feather")
@@ -1006,9 +1005,6 @@ def columns_of(
             dates.append(name)
         kept.append(place)
     if mixed:
-        shown, others = [*mixed.values()], len(mixed) - _MOST_NAMES
-        if others > 0:
-            shown[_MOST_NAMES:] = [f"and {counted(others, 'column')} more hold text"]
         hints = (
             " ".join(f"--{option} {_quoted(k)}" for k in [*mixed][:2])
             + (" ..." if len(mixed) > 2 else "")
@@ -1016,7 +1012,7 @@ def columns_of(
         )
         text = "leave columns out with ignore ({}), or take all their cells as "
         text = text + "categories with categorical ({})"
-        raise TableError("\n".join(shown) + "\n  " + text.format(*hints))
+        raise TableError(f"{_fault_text(mixed.values())}\n  {text.format(*hints)}")
     chosen = tuple(names[place] for place in kept)
     if not chosen:
         lines = [f"\n  {name}: {text}" for name, text in remarks[:_MOST_NAMES]]
@@ -1133,7 +1129,7 @@ def _numbers_of(
     if numbers is not None:
         return numbers, {}
     unknown: dict[str, int] = {}
-    values, faults = np.empty((len(chosen), piece.rows)), _Faults()
+    values, faults = np.empty((len(chosen), piece.rows)), list[str]()
     for row, (index, variable) in enumerate(zip(chosen, variables, strict=True)):
         cells, name = piece.cells[index], variable.name.strip()
         if variable.categories:
@@ -1153,21 +1149,18 @@ def _numbers_of(
         values[row], bad = _numbers(cells)
         _refuse_rounded(piece, name, cells, values[row])
         if bad:
-            faults[name] = piece.where(bad[0]), str(cells[bad[0]]), len(bad)
+            text = str(cells[bad[0]])
+            fault = f"text where a number is needed: {_shortened(text)!r}"
+            fault = number_hint([text]) or f"{fault}{_more(len(bad))}"
+            faults.append(f"{piece.where(bad[0])}: column {name!r} holds {fault}")
     if faults:
         raise TableError(_fault_text(faults))
     return values, {name: n for name, n in unknown.items() if n}
 
 
-def _fault_text(faults: _Faults) -> str:
-    """Return a sentence for each column that holds text."""
-    shown = [
-        f"{where}: column {column!r} holds text where a number is needed: "
-        f"{_shortened(text)!r}{_more(count)}"
-        if not number_hint([text])
-        else f"{where}: column {column!r} holds {number_hint([text])}"
-        for column, (where, text, count) in faults.items()
-    ]
+def _fault_text(faults: Iterable[str]) -> str:
+    """Return the sentences about columns that hold text, and how many more do."""
+    shown = [*faults]
     others = len(shown) - _MOST_NAMES
     if others > 0:
         shown[_MOST_NAMES:] = [f"and {counted(others, 'column')} more hold text"]
