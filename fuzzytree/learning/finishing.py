@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fuzzytree.learning.binary import BinaryTree
-from fuzzytree.learning.cuts import Sketch, SplitAxis, SplitCuts, TreeSplit
+from fuzzytree.learning.cuts import Sketch, SplitCuts, TreeSplit
 from fuzzytree.learning.nodes import between
 from fuzzytree.learning.patterns import Patterns, leaf_patterns
 from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.statistics import Moments
-from fuzzytree.learning.units import FloatArray, IntArray
+from fuzzytree.learning.units import IntArray
 
 
 @dataclass(frozen=True)
@@ -117,22 +117,14 @@ def _placed(split: TreeSplit, rows: TrainingRows, at: IntArray) -> TreeSplit:
     if not axis.is_combined and rows.categories[axis.features[0]] > 2:
         return split
     values, moved = rows.values[at], rows.moved[at]
-    middle = _middles(axis, split.cuts, values, moved)
-    found = axis.settled(SplitCuts(middle, split.owners), values, moved, rows.units)
-    return TreeSplit(axis, found.cuts, found.owners, ())
-
-
-def _middles(
-    axis: SplitAxis, cuts: FloatArray, values: FloatArray, moved: FloatArray
-) -> FloatArray:
-    """Return cuts in the axis' own unit, in the middle of the gaps that they lie in."""
     along, places = axis.values(values), axis.places(values, moved)
-    found: list[float] = []
-    for cut in cuts.tolist():
-        low = float(places[along <= cut].max())
-        high = float(places[along > cut].min())
-        found.append(between(low, high))
-    return np.array(found)
+    middle = [
+        between(float(places[along <= cut].max()), float(places[along > cut].min()))
+        for cut in split.cuts.tolist()
+    ]
+    cuts = SplitCuts(np.array(middle), split.owners)
+    found = axis.settled(cuts, values, moved, rows.units)
+    return TreeSplit(axis, found.cuts, found.owners, ())
 
 
 def _below(sketch: Sketch, child: int) -> list[int]:

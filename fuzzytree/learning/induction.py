@@ -124,12 +124,8 @@ def components(
         found = _connected(first[piece], second[piece], limit)
         labels[piece] = found + total
         total += int(found.max()) + 1
-    return _ranked(labels, first)
-
-
-def _ranked(labels: IntArray, values: FloatArray) -> IntArray:
-    lowest = np.full(int(labels.max()) + 1, np.inf)
-    np.minimum.at(lowest, labels, values)
+    lowest = np.full(total, np.inf)
+    np.minimum.at(lowest, labels, first)
     rank = np.argsort(np.argsort(lowest, kind="stable"), kind="stable")
     return rank[labels].astype(np.int64)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -271,8 +271,12 @@ class ArrayLearner:
         """Return what a tree is grown from."""
         drops, width = self.settings.drops_missing, len(self.columns)
         check_rows(self.statistics, self.classes, self.statistics.dropped)
-        if self.settings.mode == "paper":
-            _refuse_texts(self.categories)
+        if self.settings.mode == "paper" and self.categories:
+            names = ", ".join(map(repr, self.categories))
+            raise LearningError(
+                f"the paper's algorithm learns from numbers alone, and not from {names}"
+                "\n  leave these columns out with ignore, or learn in default mode"
+            )
         categories = [self.categories.get(name, ()) for name in self.columns]
         if self._is_weighted:
             categories.append(())
@@ -500,16 +504,6 @@ def _codes(
         else:
             raise ValueError(f"row {row + 1}: {label!r} is not among the classes")
     return codes
-
-
-def _refuse_texts(columns: Iterable[str]) -> None:
-    """Raise a LearningError if there are columns of text."""
-    names = ", ".join(map(repr, columns))
-    if names:
-        raise LearningError(
-            f"the paper's algorithm learns from numbers alone, and not from {names}\n"
-            "  leave these columns out with ignore, or learn in default mode"
-        )
 
 
 def check_rows(

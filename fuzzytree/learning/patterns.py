@@ -246,7 +246,10 @@ def clusters_of(rows: FloatArray, count: int) -> IntArray:
         inside = np.flatnonzero(owners == widest)
         owners[inside[_upper_half(rows[inside])]] = new
         owners = _settled(rows, owners, new + 1, rounds=5)
-    return _compacted(_settled(rows, owners, int(owners.max(initial=0)) + 1))
+    owners = _settled(rows, owners, int(owners.max(initial=0)) + 1)
+    _, first, inverse = np.unique(owners, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))  # in the order in which rows meet them
+    return rank[inverse].astype(np.int64)
 
 
 def _upper_half(rows: FloatArray) -> IntArray:
@@ -281,10 +284,3 @@ def _settled(
             break
         owners = nearest.astype(np.int64)
     return owners
-
-
-def _compacted(owners: IntArray) -> IntArray:
-    """Number clusters from 0 without gaps, in the order in which rows meet them."""
-    _, first, inverse = np.unique(owners, return_index=True, return_inverse=True)
-    rank = np.argsort(np.argsort(first))
-    return rank[inverse].astype(np.int64)

@@ -12,6 +12,8 @@ many further rows there are, rows that were held out decide (`choosing`).
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Iterator
 
 import msgspec
@@ -162,10 +164,7 @@ def _axis(variable: Variable, inputs: dict[str, FloatArray]) -> FloatArray:
     summands: Iterator[FloatArray] = (
         part.weight * (inputs[part.input] - part.centre) for part in variable.parts
     )
-    total = next(summands)
-    for summand in summands:
-        total = total + summand
-    return total
+    return functools.reduce(operator.add, summands)
 
 
 def _degrees(band: Band, axis: FloatArray) -> FloatArray:

@@ -81,7 +81,9 @@ class Statistics:
 
     def __post_init__(self) -> None:
         """Make room for one block and for the moments."""
-        size = block_rows(self.features)
+        rows = max(1, BLOCK_VALUES // max(1, self.features))
+        power = 1 << (rows.bit_length() - 1)
+        size = min(MOST_ROWS, max(1 << 6, power))
         shape = (self.classes, self.features)
         self._block = np.empty((size, self.features))
         self._block_codes = np.empty(size, np.int64)
@@ -304,12 +306,6 @@ class Statistics:
         found._counts = found._complete.copy()
         found._rows.keep_complete()
         return found
-
-
-def block_rows(features: int) -> int:
-    """Return how many rows of this width make a block: a power of two."""
-    rows = max(1, BLOCK_VALUES // max(1, features))
-    return int(min(MOST_ROWS, max(1 << 6, 1 << (rows.bit_length() - 1))))
 
 
 def finite_rows(values: FloatArray) -> BoolArray:

@@ -213,7 +213,9 @@ class Sums:
             starts: Where the rows of each begin.
             counts: How many they are.
         """
-        tops = _exponents(columns)
+        largest = np.maximum(columns.max(axis=1), -columns.min(axis=1))
+        exponents = np.frexp(largest)[1].astype(np.int64)  # of 2^e above all values
+        tops = np.where(largest > 0, exponents, _LOWEST)
         has_grown = tops > self._top
         if has_grown.any() or self._blocks == _MOST_BLOCKS:
             self._settle()
@@ -399,13 +401,6 @@ def _wholes_of(
         number = content[place * width : (place + 1) * width]
         result[place] = int.from_bytes(number, "little", signed=True)
     return result.reshape(groups, features)
-
-
-def _exponents(columns: FloatArray) -> IntArray:
-    """Return for each column an exponent e with |x| < 2^e; the lowest for zeros."""
-    largest = np.maximum(columns.max(axis=1), -columns.min(axis=1))
-    exponents = np.frexp(largest)[1].astype(np.int64)
-    return np.where(largest > 0, exponents, _LOWEST)
 
 
 def _limbs(columns: FloatArray, tops: IntArray) -> tuple[FloatArray, BoolArray | None]:
