@@ -952,7 +952,7 @@ def columns_of(
     contents: Mapping[str, Contents],
     categorical: Collection[str],
     values: FloatArray,
-    first: Mapping[str, Mapping[str, tuple[str, str]]] | None = None,
+    first: Mapping[str, Mapping[str, tuple[str, str]]],
 ) -> LearntColumns:
     """Decide what the columns of a table are, now that all of it was read.
 
@@ -962,7 +962,7 @@ def columns_of(
         contents: What their cells hold.
         categorical: The columns whose cells are all categories.
         values: The codes of their cells, of shape (columns, rows), or of a sample.
-        first: Where the first cell of each kind stands, and its text, if known.
+        first: Where the first cell of each kind stands, and its text.
 
     Raises:
         TableError: If cells of a column do not go together; all such columns are named.
@@ -979,7 +979,7 @@ def columns_of(
         if not held.cells and len(values[0]):
             remarks.append((name, "no value in any row; it is left out"))
             continue
-        examples = (first or {}).get(name, {})
+        examples = first.get(name, {})
         texts = held.texts or (examples.get("text", ("", ""))[1],)
         is_hinted = kind == "text" and not is_declared
         hint = number_hint(texts) if is_hinted else ""

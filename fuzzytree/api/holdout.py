@@ -147,7 +147,6 @@ def accuracy(
     table: Table,
     settings: LearningSettings,
     *,
-    folds: int = FOLDS,
     seed: int = 0,
     groups: IntArray | None = None,
     progress: Callable[[str, float], None] | None = None,
@@ -157,7 +156,6 @@ def accuracy(
     Args:
         table: The table.
         settings: How to learn.
-        folds: How many folds.
         seed: Of the shuffle.
         groups: A number for each row; rows of the same number are in the same fold.
         progress: Called with what is done and which share of it.
@@ -172,17 +170,17 @@ def accuracy(
         return None
     codes = table.codes[rows]
     if groups is None:
-        fold = folds_of(codes, folds, seed)
+        fold = folds_of(codes, FOLDS, seed)
     else:
         _, first, group = np.unique(
             groups[rows], return_index=True, return_inverse=True
         )
-        fold = folds_of(codes[first], folds, seed)[group]
+        fold = folds_of(codes[first], FOLDS, seed)[group]
     shares: list[float] = []
     weak: list[BoolArray] = []
     weights = _weights(table, settings)
     most = min(_CLASSES // len(table.classes), _COLUMNS // width)
-    tried = max(1, min(folds, most))
+    tried = max(1, min(FOLDS, most))
     for number in range(tried):
         if progress:
             progress(f"testing fold {number + 1} of {tried}", number / tried)

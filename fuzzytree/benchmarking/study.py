@@ -309,7 +309,7 @@ class _Run:
         self, rows: int, threads: int, seconds: float, progress: Progress
     ) -> None:
         """Time the candidates that answer so many rows with so many threads in time."""
-        names = [*self._members(rows, threads)]
+        names = self._members(threads)
         if not names or self._is_too_large(rows, len(names)):
             return
         names = self._fitting(names, rows, seconds)
@@ -328,19 +328,14 @@ class _Run:
         )
         self._keep(result, rows, threads, len(calls))
 
-    def _members(self, rows: int, threads: int) -> Iterator[str]:
-        """Yield the candidates to time; more threads are for parallel ones."""
-        is_first = threads == min(self.plan.threads)
-        if not is_first and not any(
-            draft.candidate.is_parallel and draft.candidate.kind != "floor"
-            for draft in self.drafts.values()
-        ):
-            return
-        for name, draft in self.drafts.items():
-            one = draft.candidate
-            if not (is_first or one.is_parallel or _is_measure(one)):
-                continue
-            yield name
+    def _members(self, threads: int) -> list[str]:
+        """Return the candidates to time; more threads are for parallel ones."""
+        known = {name: draft.candidate for name, draft in self.drafts.items()}
+        if threads == min(self.plan.threads):
+            return [*known]
+        if not any(one.is_parallel and one.kind != "floor" for one in known.values()):
+            return []
+        return [k for k, one in known.items() if one.is_parallel or _is_measure(one)]
 
     def _is_too_large(self, rows: int, count: int) -> bool:
         peers = sum(d.candidate.kind == "peer" for d in self.drafts.values())

@@ -160,10 +160,9 @@ def _bin_scores(node: Chosen, min_rows: int) -> tuple[FloatArray, IntArray]:
     return np.where(is_open, scores, -np.inf), owners
 
 
-def _split(axis: SplitAxis, *cuts: float, first: int = 0) -> TreeSplit:
+def _split(axis: SplitAxis, *cuts: float) -> TreeSplit:
     """Return a split in two whose intervals belong to the branches by turns."""
-    owners = (np.arange(len(cuts) + 1) + first) % 2
-    return TreeSplit(axis, np.array(cuts), owners, ())
+    return TreeSplit(axis, np.array(cuts), np.arange(len(cuts) + 1) % 2, ())
 
 
 def _best_categories(

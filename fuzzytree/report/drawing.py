@@ -262,9 +262,9 @@ def cut(words: str, letters: float) -> str:
     return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
 
 
-def axis_marks(x: Scale, base: float, *, most: int = 4) -> Iterator[Markup]:
+def axis_marks(x: Scale, base: float) -> Iterator[Markup]:
     """Yield the ticks of an axis with their numbers."""
-    values = ticks(x.low, x.high, most)
+    values = ticks(x.low, x.high, 4)
     previous = -math.inf
     for value, word in zip(values, tick_words(values), strict=True):
         at = x.at(value)

@@ -19,6 +19,7 @@ _WIDE, _HIGH = 320.0, 372.0
 _X = Scale(0.0, 1.0, 46.0, 306.0)
 _Y = Scale(0.0, 1.0, 316.0, 56.0)
 _BAR = 40.0  # high, of the most rows
+_BINS = 10  # parts of equal width of [0, 1]
 _RULES = """
 .axis { fill: none; stroke: #595d66; }
 .even { fill: none; stroke: #9aa0aa; stroke-dasharray: 4 3; }
@@ -29,7 +30,7 @@ _RULES = """
 
 
 def draw_reliability(
-    probabilities: FloatArray, codes: IntArray, *, bins: int = 10, title: str = ""
+    probabilities: FloatArray, codes: IntArray, *, title: str = ""
 ) -> Picture:
     """Draw how often the likeliest class is right, over its probability.
 
@@ -40,7 +41,6 @@ def draw_reliability(
     Args:
         probabilities: Shape (rows, classes), as `predict_proba` returns them.
         codes: The column of each row's own class.
-        bins: Into how many parts of equal width [0, 1] is cut.
         title: Above the picture.
 
     Returns:
@@ -61,11 +61,11 @@ def draw_reliability(
             f"{shares.shape} and {own.shape}"
         )
     claimed, is_right = shares.max(axis=1), shares.argmax(axis=1) == own
-    place = np.minimum((claimed * bins).astype(np.int64), bins - 1)
-    rows = np.bincount(place, minlength=bins)
+    place = np.minimum((claimed * _BINS).astype(np.int64), _BINS - 1)
+    rows = np.bincount(place, minlength=_BINS)
     filled = np.flatnonzero(rows)
-    claims = np.bincount(place, claimed, minlength=bins)[filled] / rows[filled]
-    rights = np.bincount(place, is_right, minlength=bins)[filled] / rows[filled]
+    claims = np.bincount(place, claimed, minlength=_BINS)[filled] / rows[filled]
+    rights = np.bincount(place, is_right, minlength=_BINS)[filled] / rows[filled]
     error = float((rows[filled] * np.abs(claims - rights)).sum() / len(own))
     chances = shares[np.arange(len(own)), own]
     loss = -float(np.log(np.maximum(chances, 1e-15)).mean())

@@ -212,12 +212,11 @@ class Followed:
     placements: npt.NDArray[np.int64]
 
 
-def followed(file: FrameFile, least: int = LEAST_AREA) -> Followed:
+def followed(file: FrameFile) -> Followed:
     """Return the frames of a file as live recognition would see them.
 
     Args:
         file: A recording, an archive or a table.
-        least: The fewest cells of an object.
 
     Raises:
         ReadError: If the file cannot be read.
@@ -234,7 +233,7 @@ def followed(file: FrameFile, least: int = LEAST_AREA) -> Followed:
         if file.sensor is not stated:
             stated = file.sensor
             rest.restart(stated)
-        found, _ = regions(rest(frame.cells, frame.time), least)
+        found, _ = regions(rest(frame.cells, frame.time), LEAST_AREA)
         saturated += rest.saturated(frame.cells) > 0
         several += len(found) > 1
         count += is_free and bool(found)
