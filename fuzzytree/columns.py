@@ -167,26 +167,13 @@ def coded(
     counts: dict[str, int] = {}
     first: dict[str, int] = {}
     of_value = np.bincount(indices, minlength=len(values)).tolist()
-    for kind in dict.fromkeys(kinds):
+    for kind in filter(None, dict.fromkeys(kinds)):
         chosen = [k for k, one in enumerate(kinds) if one == kind]
         counts[kind] = sum(of_value[k] for k in chosen)
-        if kind and counts[kind]:
+        if counts[kind]:
             first[kind] = int(np.isin(indices, chosen).argmax())
-    contents = _contents(counts, _bounded({*texts.values()}))
+    contents = Contents(**counts, texts=_bounded({*texts.values()}))
     return numbers[indices], contents, first
-
-
-def _contents(
-    counts: Mapping[str, int], texts: tuple[str, ...] | None = ()
-) -> Contents:
-    return Contents(
-        counts.get("number", 0),
-        counts.get("boolean", 0),
-        counts.get("date", 0),
-        counts.get("text", 0),
-        counts.get("other", 0),
-        texts,
-    )
 
 
 def _plain(
@@ -198,7 +185,7 @@ def _plain(
     if count < len(values):
         values = np.where(is_none, math.nan, values)
     first = {kind: int((~is_none).argmax())} if count else {}
-    return values, _contents({kind: count}), first
+    return values, Contents(**{kind: count}, texts=()), first
 
 
 def _read(value: object, *, is_categorical: bool) -> tuple[str, float | str]:

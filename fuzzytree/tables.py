@@ -1249,12 +1249,6 @@ def trimmed(piece: TablePiece) -> list[tuple[str, str]]:
     return [(repr(title), text) for title in result[:1]]
 
 
-def _some(names: Iterable[str]) -> list[str]:
-    """Return the first few of many names, and three dots for the others."""
-    result = list(itertools.islice(names, _MOST_NAMES + 1))
-    return [*result[:_MOST_NAMES], "..."] if len(result) > _MOST_NAMES else result
-
-
 def _needed_columns(
     piece: TablePiece, inputs: Sequence[str], trained: Sequence[str]
 ) -> list[int]:
@@ -1279,7 +1273,8 @@ def _refuse_absent(piece: TablePiece, wanted: Sequence[str], why: str) -> None:
     absent = [name for name in wanted if name not in known_names]
     if not absent:
         return
-    known = ", ".join(_some(piece.columns))
+    dots = ["..."] * (len(piece.columns) > _MOST_NAMES)
+    known = ", ".join([*piece.columns[:_MOST_NAMES], *dots])
     close = difflib.get_close_matches(absent[0], piece.columns, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close and len(absent) == 1 else ""
     word = "column" if len(absent) == 1 else "columns"
