@@ -201,7 +201,7 @@ def accuracy(
             weights=None if table.row_weights is None else table.row_weights[kept],
         )
         tree = learnt.tree
-        places = [table.columns.index(name) for name in tree.inputs]
+        places = np.array([table.columns.index(k) for k in tree.inputs], np.int64)
         values = table.values[np.ix_(places, test)]
         rules = baseline().load(tree)(values).rule
         if groups is not None and tree.sets:
