@@ -373,11 +373,12 @@ def check(
     """
     chosen = settings or CheckSettings()
     first = checking.as_model(model, allow_loss=allow_loss)
-    names = as_names(names)
     titles = [
-        names[k] if k < len(names) else _title(other, k)
-        for k, other in enumerate(others)
+        os.fspath(other) if isinstance(other, str | os.PathLike) else f"file {number}"
+        for number, other in enumerate(others, 1)
     ]
+    names = as_names(names)
+    titles = [*names, *titles[len(names) :]][: len(others)]
     rest = [
         _program(other, chosen.run_code) or opened(other, allow_loss=allow_loss)
         for other in others
@@ -943,9 +944,3 @@ def stability(
         select=select,
         progress=progress or (lambda _text, _share: None),
     )
-
-
-def _title(other: Carried, position: int) -> str:
-    if isinstance(other, str | os.PathLike):
-        return os.fspath(other)
-    return f"file {position + 1}"

@@ -224,10 +224,7 @@ def _nothing(values: FloatArray) -> CandidateOutput:
 
 
 def _load_reading(threads: int) -> LoadedCandidate:
-    def call(values: FloatArray) -> Callable[[], object]:
-        return partial(values.sum, axis=1)
-
-    return LoadedCandidate(_nothing, call)
+    return LoadedCandidate(_nothing, lambda values: partial(values.sum, axis=1))
 
 
 def _load_session(threads: int) -> LoadedCandidate:

@@ -678,7 +678,10 @@ def open_state(
         text = (batch.schema.metadata or {}).get(b"fuzzytree", b"")
         found = msgspec.json.decode(text, type=_Magic).magic
         if found != magic:
-            raise ValueError(_otherwise(found, magic))
+            what = f"is {found!r}, and {magic!r} is read"
+            if writer := _WRITERS.get(found):
+                what = f"is a state of {writer}, and one of {_WRITERS[magic]} is needed"
+            raise ValueError(what)
         header = msgspec.json.decode(text, type=StateHeader)
         arrays: dict[str, npt.NDArray[np.generic]] = {
             name: np.from_dlpack(column.flatten())
@@ -702,10 +705,3 @@ def open_state(
 
 class _Magic(msgspec.Struct):
     magic: str
-
-
-def _otherwise(found: str, magic: str) -> str:
-    """Return that a state is of another kind or version."""
-    if writer := _WRITERS.get(found):
-        return f"is a state of {writer}, and one of {_WRITERS[magic]} is needed"
-    return f"is {found!r}, and {magic!r} is read"

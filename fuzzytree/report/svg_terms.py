@@ -89,7 +89,8 @@ def terms_picture(
     if value is not None:
         at = x.at(value)
         parts.append(mark("line", at, at, top - 4, y.start, "pin"))
-        parts.append(mark("path", _diamond(at, y.start), "witness"))
+        diamond = f"M{at:.1f} {y.start - 5.5:.1f}l5.5 5.5l-5.5 5.5l-5.5 -5.5z"
+        parts.append(mark("path", diamond, "witness"))
     if len(names) < len(axis.curves):
         said = f"+ {len(drawn) - len(names)} unnamed"
         if len(drawn) < len(axis.curves):
@@ -229,7 +230,3 @@ def _ends(span: Span, x: Scale) -> tuple[float, float]:
         middle = (start + end) / 2.0
         return middle - _SLIVER / 2.0, middle + _SLIVER / 2.0
     return start, end
-
-
-def _diamond(x: float, y: float) -> str:
-    return f"M{x:.1f} {y - 5.5:.1f}l5.5 5.5l-5.5 5.5l-5.5 -5.5z"
