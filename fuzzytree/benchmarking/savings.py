@@ -268,7 +268,7 @@ def costs(
             ):
                 groups[rows_of][key] = call
         if table is not None:
-            reading = _reading(table, model)
+            reading = partial(_read, table, model)
             try:
                 reading()
             except FuzzyTreeError as error:
@@ -316,14 +316,11 @@ def _calls(
             yield count, (stage, title, name, what), partial(run, values)
 
 
-def _reading(table: object, model: Model) -> Call:
-    def read() -> int:
-        pieces = batches(
-            table, model.inputs, trained=model.columns, variables=model.variables
-        )
-        return sum(batch.values.shape[1] for batch in pieces)
-
-    return read
+def _read(table: object, model: Model) -> int:
+    pieces = batches(
+        table, model.inputs, trained=model.columns, variables=model.variables
+    )
+    return sum(batch.values.shape[1] for batch in pieces)
 
 
 def _plain_rows(model: Model, count: int) -> FloatArray:
