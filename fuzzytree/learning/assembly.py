@@ -150,7 +150,12 @@ def assembled(
     nodes, terms = _nodes(sketch, keys, called, flanks, pattern_names)
     inputs = sorted({int(f) for a in axes.values() for f in a.axis.features})
     variables = [
-        _input(feature, statistics, names, terms.get((feature, -1), ()))
+        Variable(
+            name := names.columns[feature],
+            terms.get((feature, -1), ()),
+            names.units.get(name, ""),
+            *statistics.extent(feature),
+        )
         for feature in inputs
     ]
     for key, found in axes.items():
@@ -517,14 +522,6 @@ def _node(
             )
         )
     return Node(variable, tuple(split.cuts.tolist()), tuple(owners), tuple(branches))
-
-
-def _input(
-    feature: int, statistics: Statistics, names: TermNames, terms: tuple[Term, ...]
-) -> Variable:
-    name = names.columns[feature]
-    low, high = statistics.extent(feature)
-    return Variable(name, terms, names.units.get(name, ""), low, high)
 
 
 def _combination(

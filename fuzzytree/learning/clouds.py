@@ -80,8 +80,9 @@ def parted_clouds(
     if standard.shape[1] < 2:
         return None
     means, sizes, scatter = _centres(node, standard)
-    scatter = _drawn(scatter, len(node.at) - node.classes, whole.scatter)
-    scatter = shrunk(scatter, rules.shrinkage)
+    columns, freedom = len(scatter), max(len(node.at) - node.classes, 0)
+    scatter = freedom * scatter + columns * whole.scatter  # which few rows lean on
+    scatter = shrunk(scatter / (freedom + columns), rules.shrinkage)
     present = np.unique(node.rows.codes[node.at])
     counts = sizes >= _STRAY * whole.sizes[present]
     if np.count_nonzero(counts) < 2:
@@ -208,12 +209,6 @@ def _centres(
     within = (moved * node.weights[order][:, None]).T @ moved
     freedom = max(len(order) - node.classes, 1) / len(order)
     return means, sizes, within / (sizes.sum() * freedom)
-
-
-def _drawn(own: FloatArray, freedom: int, whole: FloatArray) -> FloatArray:
-    """Return a node's scatter, drawn to that of all rows if it has few rows."""
-    freedom = max(freedom, 0)
-    return (freedom * own + len(own) * whole) / (freedom + len(own))
 
 
 def _whitening(scatter: FloatArray) -> FloatArray:
