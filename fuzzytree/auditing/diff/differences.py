@@ -92,8 +92,12 @@ def joined_domain(
             if origins[0] == "unused" or origins == ("curves", "model"):
                 sides[side.variable] = side
             elif known is not None and known.origin == side.origin:
-                low, high = min(known.low, side.low), max(known.high, side.high)
-                sides[side.variable] = DomainSide(side.variable, low, high, side.origin)
+                sides[side.variable] = msgspec.structs.replace(
+                    side,
+                    low=min(known.low, side.low),
+                    high=max(known.high, side.high),
+                    values=tuple(sorted({*known.values, *side.values})),
+                )
     domain = Domain(tuple(sides.values()))
     if limits:
         domain = limited(domain, limits, union(old, new))

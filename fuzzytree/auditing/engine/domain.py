@@ -20,7 +20,7 @@ depends on the variable), the user."""
 
 
 class DomainSide(Value, frozen=True):
-    """The values of one variable in the domain: `low <= x <= high`.
+    """The values of one variable in the domain: those that rows can have.
 
     Attributes:
         variable: An input; or a combination, which limits its inputs together.
@@ -28,6 +28,11 @@ class DomainSide(Value, frozen=True):
         high: The upper end, finite, not below `low`.
         origin: Where the two come from.
         is_open: Whether `low` itself is left out.
+        values: The only values from low to high, ascending: the codes of categories.
+            Empty if every number is one, or every whole number.
+        is_whole: Whether only whole numbers are; both ends are whole then.
+        missing: The stand-in of a missing value: one more value of rows, which may lie
+            beyond the ends or between whole numbers.
     """
 
     variable: str
@@ -35,11 +40,55 @@ class DomainSide(Value, frozen=True):
     high: float
     origin: Origin = "limits"
     is_open: bool = False
+    values: tuple[float, ...] = ()
+    is_whole: bool = False
+    missing: float | None = None
+
+    @property
+    def points(self) -> tuple[float, ...]:
+        """All values of an axis of categories, the stand-in too; empty for numbers."""
+        stand_in = () if self.missing is None else (self.missing,)
+        return tuple(sorted({*self.values, *stand_in})) if self.values else ()
 
     @property
     def ends(self) -> tuple[Fraction, Fraction]:
-        """Both ends, exactly."""
-        return Fraction(self.low), Fraction(self.high)
+        """The least and the largest value, exactly; one may be the stand-in."""
+        low, high = Fraction(self.low), Fraction(self.high)
+        if self.missing is None:
+            return low, high
+        return min(low, Fraction(self.missing)), max(high, Fraction(self.missing))
+
+    def has(self, value: Fraction) -> bool:
+        """Return whether a row can have a value, exactly.
+
+        Example:
+            >>> doors = DomainSide("doors", 1.0, 5.0, is_whole=True, missing=2.5)
+            >>> [doors.has(Fraction(n, 2)) for n in (2, 3, 5, 12)]
+            [True, False, True, False]
+        """
+        if value == self.missing:
+            return True
+        if not self.low <= value <= self.high or (self.is_open and value == self.low):
+            return False
+        if self.values:
+            return value in self.values
+        return not self.is_whole or value.denominator == 1
+
+    def nearest(self, value: Fraction) -> Fraction:
+        """Return the value nearest to a number that rows can have, the lower of two.
+
+        Example:
+            >>> doors = DomainSide("doors", 1.0, 5.0, is_whole=True)
+            >>> [int(doors.nearest(Fraction(n, 2))) for n in (-3, 5, 7, 30)]
+            [1, 2, 3, 5]
+        """
+        inside = min(max(value, Fraction(self.low)), Fraction(self.high))
+        if self.is_whole:
+            inside = Fraction(math.ceil(inside - Fraction(1, 2)))
+        numbers = [*map(Fraction, self.points)] or [inside]
+        if self.missing is not None:
+            numbers.append(Fraction(self.missing))
+        return min(numbers, key=lambda number: (abs(number - value), number))
 
 
 class Domain(Value, frozen=True):
@@ -76,7 +125,18 @@ def limited(
                 "the smaller one stands first"
             )
     sides = [side for side in domain.sides if side.variable not in limits]
-    sides += [DomainSide(name, low, high) for name, (low, high) in limits.items()]
+    for variable in model.variables:
+        if variable.name not in limits:
+            continue
+        low, high = limits[variable.name]
+        codes = map(float, range(len(variable.categories)))
+        values = tuple(code for code in codes if low <= code <= high)
+        missing = variable.missing
+        if missing is not None and not low <= missing <= high:
+            missing = None
+        sides.append(
+            DomainSide(variable.name, low, high, values=values, missing=missing)
+        )
     order = {name: place for place, name in enumerate(names)}
     return Domain(tuple(sorted(sides, key=lambda side: order[side.variable])))
 
@@ -159,7 +219,6 @@ def contains(
         side = domain.side(variable.name)
         if side is None:
             continue
-        value = variable_value(variable, point)
-        if not side.low <= value <= side.high or (side.is_open and value == side.low):
+        if not side.has(variable_value(variable, point)):
             return False
     return True

@@ -13,6 +13,8 @@ import math
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
+from msgspec.structs import replace
+
 from fuzzytree.auditing.engine.domain import (
     Domain,
     DomainSide,
@@ -125,19 +127,40 @@ def cut_side(side: DomainSide, interval: Interval) -> DomainSide | None:
     """Return the part of a side within an interval, None if there is none.
 
     Example:
-        >>> cut_side(DomainSide("x", 0.0, 2.0), (None, 0.0))
-        DomainSide(variable='x', low=0.0, high=0.0, origin='limits', is_open=False)
+        >>> cut_side(DomainSide("x", 0.0, 2.0), (None, 0.0)).high
+        0.0
         >>> cut_side(DomainSide("x", 0.0, 2.0), (2.0, None)) is None
         True
     """
     below, above = interval
+    missing = side.missing
+    if missing is not None and not _is_in(missing, interval):
+        missing = None
     low, is_open = side.low, side.is_open
     if below is not None and below >= low:
         low, is_open = below, True
     high = side.high if above is None else min(side.high, above)
-    if low > high or (low == high and is_open):
+    values = tuple(value for value in side.values if _is_in(value, interval))
+    if side.is_whole:
+        low, high, is_open = math.floor(low) + is_open, math.floor(high), False
+    elif values:
+        low, high, is_open = values[0], values[-1], False
+    if (
+        not low > high
+        and not (low == high and is_open)
+        and bool(values) == bool(side.values)
+    ):
+        return replace(
+            side, low=low, high=high, is_open=is_open, values=values, missing=missing
+        )
+    if missing is None:
         return None
-    return DomainSide(side.variable, low, high, side.origin, is_open)
+    return DomainSide(side.variable, missing, missing, side.origin, values=(missing,))
+
+
+def _is_in(value: float, interval: Interval) -> bool:
+    below, above = interval
+    return (below is None or value > below) and (above is None or value <= above)
 
 
 def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:

@@ -72,7 +72,9 @@ def domain_of(
         if axis.name in left_out:
             continue
         try:
-            if spreads is not None:
+            if axis.categories and (within == "model" or spreads is not None):
+                sides.append(DomainSide(axis.name, 0.0, axis.categories - 1.0, "model"))
+            elif spreads is not None:
                 sides.append(_around(axis, spreads, values))
             elif within == "data":
                 sides.append(_seen(axis, values))
@@ -85,12 +87,28 @@ def domain_of(
                 value = (row or {}).get(axis.name, 0.0)
                 ends = (0.0, 1.0, value if math.isfinite(value) else 0.0)
                 sides.append(DomainSide(axis.name, min(ends), max(ends), "unused"))
+        if sides and sides[-1].variable == axis.name:
+            sides[-1] = _with_values(sides[-1], axis, values)
     if faults:
         more = [f"and {len(faults) - _MOST_FAULTS} more such inputs"]
         raise ValueError(
             "\n".join(faults[:_MOST_FAULTS] + (more if faults[_MOST_FAULTS:] else []))
         )
     return Domain(tuple(sides))
+
+
+def _with_values(side: DomainSide, axis: _Axis, rows: FloatArray | None) -> DomainSide:
+    """Return a side with the values that rows can have, or that these rows have."""
+    seen = (
+        rows[np.isfinite(rows)] if side.origin == "data" and rows is not None else None
+    )
+    values: tuple[float, ...] = ()
+    if axis.categories:
+        codes = np.arange(axis.categories) if seen is None else np.unique(seen)
+        values = tuple(map(float, codes))
+    has_missing = seen is None or rows is None or len(seen) < len(rows)
+    missing = axis.missing if has_missing else None
+    return msgspec.structs.replace(side, values=values, missing=missing)
 
 
 def _declared(axis: _Axis, values: FloatArray | None) -> DomainSide:
@@ -182,6 +200,8 @@ class _Axis(msgspec.Struct, frozen=True):
     is_open: bool
     sets: tuple[LR, ...]
     is_used: bool
+    categories: int
+    missing: float | None
 
 
 def _axes(model: Document) -> Iterator[_Axis]:
@@ -202,7 +222,8 @@ def _axes(model: Document) -> Iterator[_Axis]:
             sets = tuple(curve for curve in own if isinstance(curve, LR))
             is_used = one.name in summed or any(curve != Band() for curve in own)
             is_open = any(map(_is_open, own))
-            yield _Axis(one.name, one.low, one.high, ends, is_open, sets, is_used)
+            facts = is_open, sets, is_used, len(one.categories), one.missing
+            yield _Axis(one.name, one.low, one.high, ends, *facts)
 
 
 def _is_open(curve: Curve) -> bool:

@@ -14,6 +14,7 @@ from fuzzytree.auditing.engine.arrangement import Arrangement, restricted
 from fuzzytree.auditing.engine.clock import OutOfTimeError
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, span
 from fuzzytree.auditing.engine.questions import uncovered
+from fuzzytree.auditing.engine.regions import cut_side
 from fuzzytree.auditing.engine.states import Declined, Proved, Span, State, Witness
 from fuzzytree.auditing.findings.bounded_arrangement import (
     BoundedArrangement,
@@ -156,13 +157,12 @@ def _around(
             ends = span(variables[inner.variable], box)
             low, high = outwards(ends[0])[0], outwards(ends[1])[1]
             side = DomainSide(inner.variable, low, high, "model")
-        for low, high in (
-            (side.low, math.nextafter(inner.low, -math.inf)),
-            (math.nextafter(inner.high, math.inf), side.high),
+        for part in (
+            cut_side(side, (None, math.nextafter(inner.low, -math.inf))),
+            cut_side(side, (inner.high, None)),
         ):
-            if low <= high:
-                part = DomainSide(side.variable, low, high, side.origin)
+            if part is not None:
                 yield Domain(tuple({**sides, side.variable: part}.values()))
-        sides[side.variable] = DomainSide(
-            side.variable, inner.low, inner.high, side.origin
-        )
+        low = inner.low if inner.low > side.low else -math.inf
+        inside = cut_side(side, (math.nextafter(low, -math.inf), inner.high))
+        sides[side.variable] = inside or side

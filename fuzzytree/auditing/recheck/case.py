@@ -75,7 +75,9 @@ class Case:
         if not variable.parts:
             require(side is not None, f"the domain has no side {variable.name!r}")
             assert side is not None
-            return Fraction(side.low), Fraction(side.high)
+            stand_in = side.low if side.missing is None else side.missing
+            ends = side.low, side.high, stand_in
+            return Fraction(min(ends)), Fraction(max(ends))
         weights = dict.fromkeys((name for name, *_ in variable.parts), ZERO)
         low = high = -sum((w * c for _, w, c in variable.parts), start=ZERO)
         for name, weight, _ in variable.parts:  # an input may stand several times
@@ -266,7 +268,7 @@ class Case:
     def is_within(self, point: Point) -> bool:
         """Return whether a point is in the domain."""
         values = {n: self.model.variables[n].at(point) for n in self.sides}
-        return all(side.low <= values[n] <= side.high for n, side in self.sides.items())
+        return all(side.has(values[n]) for n, side in self.sides.items())
 
     def point_of(self, coordinates: Sequence[Coordinate]) -> dict[str, Fraction]:
         """Return a point of the domain with a value of every input."""

@@ -142,7 +142,18 @@ def _domain(audit: Audit, case: Case, report: Report) -> None:
         text = f"the side of {name!r}"
         expect(side.low <= side.high, f"{text} has swapped ends")
         one = variables.get(name)
-        if one is not None and side.origin == "model" and not one.is_clipped:
+        codes = () if one is None else one.codes
+        is_part = {*side.values} <= {*codes} and bool(side.values) == bool(codes)
+        ends = (side.values[0], side.values[-1]) if side.values else None
+        is_part &= ends in (None, (side.low, side.high))
+        expect(is_part, f"{text} has other values than the codes of its categories")
+        stand_in = None if one is None else one.missing
+        if side.origin not in ("data", "limits"):
+            expect(side.values == codes, f"{text} leaves categories out")
+            expect(side.missing == stand_in, f"{text} has another stand-in")
+        expect(side.missing in (None, stand_in), f"{text} has a stand-in of its own")
+        is_range = side.origin == "model" and not codes
+        if one is not None and is_range and not one.is_clipped:
             is_range = (side.low, side.high) == (one.low, one.high)
             expect(is_range, f"{text} is not the model's range")
         if one is not None and one.is_clipped and not one.parts:

@@ -66,6 +66,8 @@ class Variable(NamedTuple):
     high: float | None
     parts: tuple[tuple[str, Fraction, Fraction], ...]
     is_clipped: bool = False
+    codes: tuple[float, ...] = ()
+    missing: float | None = None
 
     def at(self, point: Point) -> Fraction:
         """Return its value at a point."""
@@ -545,7 +547,13 @@ def _variable(one: Facts) -> Variable:
     ]
     curves = _curves(one.get("terms", []))
     unit, is_clipped = one.get("unit", ""), "outside" in ends
-    return Variable(one["name"], curves, unit, low, high, tuple(inputs), is_clipped)
+    codes = tuple(map(float, range(len(one.get("categories", [])))))
+    missing = one.get("missing as")
+    stand_in = None if missing is None else number_of(missing)
+    parts = tuple(inputs)
+    return Variable(
+        one["name"], curves, unit, low, high, parts, is_clipped, codes, stand_in
+    )
 
 
 def _curves(terms: Iterable[Facts]) -> dict[str, Curve]:

@@ -137,6 +137,15 @@ class DomainSide(NamedTuple):
     high: float
     origin: Literal["model", "data", "spreads", "curves", "unused", "limits"]
     is_open: bool
+    values: tuple[float, ...]
+    is_whole: bool
+    missing: float | None
+
+    def has(self, value: Fraction) -> bool:
+        """Return whether a row can have a value."""
+        is_listed = not self.values or value in self.values
+        is_listed &= not self.is_whole or value.denominator == 1
+        return value == self.missing or (self.low <= value <= self.high and is_listed)
 
 
 class Domain(NamedTuple):
