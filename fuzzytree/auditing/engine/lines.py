@@ -28,7 +28,7 @@ from fuzzytree.model import (
     checkpoint,
     hedged,
 )
-from fuzzytree.numerics import degree_between, exact_degree, outwards
+from fuzzytree.numerics import CAP, degree_between, exact_degree, outwards
 from fuzzytree.semantics import Enclosed, Interval, Jet, degree_bounds, jet
 
 APART: Final = Fraction(1, 1 << 10)
@@ -158,7 +158,11 @@ def lines_of(function: MembershipFunction, low: Fraction, high: Fraction) -> Bet
         Fraction(1, 2)
     """
     checkpoint()
-    inner = (Fraction(k) for k in function.knots() if math.isfinite(k))
+    inner = [Fraction(k) for k in function.knots() if math.isfinite(k)]
+    if isinstance(function, Band):  # beside its plateau a degree is at most `CAP`
+        for edge, end in function.flanks:
+            zero = Fraction(end)
+            inner.append(zero + CAP * (Fraction(edge) - zero))
     knots = sorted({low, high, *(k for k in inner if low < k < high)})
     if not isinstance(function, Band | Points):
         return _enclosed(function, knots)
@@ -190,13 +194,13 @@ class _Chord(NamedTuple):
 
 def _enclosed(function: MembershipFunction, knots: Sequence[Fraction]) -> Between:
     if len(knots) == 1:
-        low, high = _degree(function, knots[0])
+        low, high = degree_within(function, knots[0])
         x = knots[0]
         return Between(constant(low, x, x), constant(high, x, x))
     blocks = [
         one for a, b in itertools.pairwise(knots) for one in _blocks(function, a, b)
     ]
-    degrees = {x: _degree(function, x) for x in knots}
+    degrees = {x: degree_within(function, x) for x in knots}
     # Elsewhere it is continuous.
     limits = {(x, to): _limit(function, x, to) for x in knots for to in (-1, 1)}
     sides: tuple[list[_Chord], list[_Chord]] = ([], [])
@@ -204,7 +208,7 @@ def _enclosed(function: MembershipFunction, knots: Sequence[Fraction]) -> Betwee
         for a, b in block.parts:
             checkpoint()
             if b not in degrees:
-                degrees[b] = _degree(function, b)
+                degrees[b] = degree_within(function, b)
             ends = limits.get((a, 1), degrees[a]), limits.get((b, -1), degrees[b])
             for side, chord in zip(sides, _chords(block, (a, b), ends), strict=True):
                 side.append(chord)
@@ -355,7 +359,7 @@ def _limit(
     if isinstance(function, LR | Band | Points):
         curve = RuleCurve(function)
         return _rounded(curve.degree_after(x) if to > 0 else curve.degree(x))
-    at = _degree(function, x)
+    at = degree_within(function, x)
     if x != Fraction(float(x)):
         return at
     ends = sorted((float(x), math.nextafter(float(x), to * math.inf)))
@@ -371,11 +375,14 @@ def _rounded(value: Fraction) -> tuple[Fraction, Fraction]:
     return low, low if low == value else low + Fraction(1, _GRID)
 
 
-def _degree(function: MembershipFunction, x: Fraction) -> tuple[Fraction, Fraction]:
+def degree_within(
+    function: MembershipFunction, x: Fraction
+) -> tuple[Fraction, Fraction]:
+    """Return between which fractions of few digits a degree lies."""
     if isinstance(function, LR):
         return _rounded(exact_degree(function, x))
     if isinstance(function, Hedged):
-        return _changed(function, _degree(function.function, x))
+        return _changed(function, degree_within(function.function, x))
     known = None
     if (
         isinstance(function, Curve) and float(x) in function.knots()

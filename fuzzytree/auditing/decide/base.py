@@ -1,0 +1,390 @@
+"""Rules on a domain, ready for questions: axes, exact strengths, points, samples."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from fuzzytree.auditing.decide.answers import ONE, ZERO
+from fuzzytree.auditing.decide.axes import (
+    MOST_PIECES,
+    MOST_WHOLE,
+    Axis,
+    literal_bounds,
+)
+from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, Literal, rules_of
+from fuzzytree.auditing.engine.domain import Domain, combined
+from fuzzytree.auditing.engine.lines import Lines
+from fuzzytree.model import BoolArray, Document, FloatArray, Variable
+
+SAMPLES = 4096
+"""Points that are drawn, which find most of what there is to find."""
+
+_GRID = 1 << 20  # drawn numbers are multiples of a range by this
+
+
+class Base:
+    """The rules of one model, or of several side by side, on a domain.
+
+    Attributes:
+        rules: The rules.
+        axes: What they ask: the axes by the name of the variable; of several models an
+            axis that differs has a name of its own.
+        inputs: The inputs of all, as axes.
+        domain: The domain.
+        silent: Rules that never fire, as their text says.
+        left_out: Rules that have no exact method.
+
+    Example:
+        >>> from fuzzytree.auditing.engine.domain import DomainSide
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1)
+        >>> box = Domain(tuple(DomainSide(name, -1.0, 1.0) for name in tree.inputs))
+        >>> Base.of(tree, box).rules[0].number
+        1
+    """
+
+    def __init__(
+        self,
+        rules: Sequence[BaseRule],
+        variables: Mapping[str, Variable],
+        domain: Domain,
+        *,
+        seed: int = 0,
+        most_pieces: int = MOST_PIECES,
+    ) -> None:
+        self.rules, self.variables, self.domain = tuple(rules), variables, domain
+        self.seed, self.most_pieces = seed, most_pieces
+        self.silent: tuple[tuple[str, int, str], ...] = ()
+        self.left_out: tuple[LeftOut, ...] = ()
+        self.count = len(self.rules)
+        self.every = (1 << self.count) - 1
+        self.inputs: dict[str, Axis] = {}
+        for variable in variables.values():
+            if not variable.parts:
+                self.inputs[variable.name] = self._input(variable)
+        asked = {name for rule in self.rules for name, _ in rule.literals}
+        self.axes: dict[str, Axis] = {}
+        self.is_empty = False
+        for name, variable in variables.items():
+            if name in asked or (domain.side(name) is not None and variable.parts):
+                self.axes[name] = self._axis(name, variable)
+        for place, rule in enumerate(self.rules):
+            for name, literal in rule.literals:
+                users = self.axes[name].literals
+                users[literal] = users.get(literal, 0) | 1 << place
+        for axis in self.axes.values():
+            axis.most_pieces = most_pieces
+
+    @classmethod
+    def of(cls, model: Document, domain: Domain, seed: int = 0) -> Base:
+        """Return the rules of a model on a domain.
+
+        Raises:
+            ValueError: If an input has no side.
+        """
+        every = rules_of(model)
+        variables = {variable.name: variable for variable in model.variables}
+        base = cls(every.rules, variables, domain, seed=seed)
+        base.silent, base.left_out = every.silent, every.left_out
+        return base
+
+    @classmethod
+    def of_both(
+        cls, old: Document, new: Document, domain: Domain, seed: int = 0
+    ) -> Base:
+        """Return the rules of two models side by side, the old ones first.
+
+        Inputs of one name are one axis; a sum of either is an axis of its own.
+
+        Raises:
+            ValueError: If an input has no side.
+        """
+        variables: dict[str, Variable] = {}
+        rules: list[BaseRule] = []
+        for place, model in enumerate((old, new)):
+            names: dict[str, str] = {}
+            for variable in model.variables:
+                names[variable.name] = variable.name
+                if variable.parts:
+                    while variables.get(names[variable.name], variable) != variable:
+                        names[variable.name] += "'"
+                variables.setdefault(names[variable.name], variable)
+            for rule in rules_of(model).rules:
+                literals = tuple((names[name], one) for name, one in rule.literals)
+                rules.append(rule._replace(literals=literals, model=place))
+        return cls(rules, variables, domain, seed=seed)
+
+    def with_rules(self, more: Iterable[BaseRule]) -> Base:
+        """Return the same with further rules behind."""
+        rules = (*self.rules, *more)
+        return Base(rules, self.variables, self.domain, seed=self.seed)
+
+    def on(self, domain: Domain) -> Base:
+        """Return the same rules on another domain."""
+        return Base(self.rules, self.variables, domain, seed=self.seed)
+
+    @cached_property
+    def fine(self) -> Base:
+        """The same with curves between lines that are closer, for boxes."""
+        if self.is_exact:
+            return self
+        return Base(
+            self.rules, self.variables, self.domain, seed=self.seed, most_pieces=4096
+        )
+
+    def _input(self, variable: Variable) -> Axis:
+        side = self.domain.side(variable.name)
+        if side is None:
+            raise ValueError(f"the domain has no side for {variable.name!r}")
+        ends = Fraction(side.low), Fraction(side.high)
+        axis = Axis(variable.name, {variable.name: ONE}, ZERO, ends)
+        axis.is_open = side.is_open
+        stand_in = () if side.missing is None else (side.missing,)
+        if side.values:
+            axis.set_values(Fraction(v) for v in (*side.values, *stand_in))
+        elif side.is_whole and side.high - side.low < MOST_WHOLE:
+            whole = range(int(side.low), int(side.high) + 1)
+            axis.set_values(Fraction(v) for v in (*whole, *stand_in))
+        else:
+            axis.is_whole = side.is_whole
+            extra = map(Fraction, stand_in)
+            axis.extra = tuple(v for v in extra if not axis.contains(v))
+        return axis
+
+    def _axis(self, name: str, variable: Variable) -> Axis:
+        if not variable.parts:
+            return self.inputs[variable.name]
+        places = {of: n for n, of in enumerate(self.inputs)}
+        names = [*self.inputs]
+        by_place, constant = combined(variable.parts, places)
+        weights = {names[place]: weight for place, weight in by_place.items()}
+        low = high = constant
+        for of, weight in weights.items():
+            axis = self.inputs[of]
+            ends = weight * axis.least, weight * axis.largest
+            low, high = low + min(ends), high + max(ends)
+        side = self.domain.side(variable.name)
+        if side is not None:
+            low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))
+        if low > high:
+            self.is_empty, high = True, low
+        return Axis(name, weights, constant, (low, high))
+
+    # --- what kind of base it is
+
+    @cached_property
+    def is_coupled(self) -> bool:
+        """Whether two axes share inputs, so that they are not free of each other."""
+        names = [of for axis in self.axes.values() for of in axis.weights]
+        return len(names) != len(set(names))
+
+    @cached_property
+    def is_exact(self) -> bool:
+        """Whether all degrees are known exactly."""
+        return all(axis.is_exact for axis in self.axes.values())
+
+    @cached_property
+    def is_lattice(self) -> bool:
+        """Whether all rules take the minimum."""
+        return all(rule.norm == "minimum" for rule in self.rules)
+
+    @cached_property
+    def used(self) -> tuple[Axis, ...]:
+        """The axes that rules ask."""
+        return tuple(axis for axis in self.axes.values() if axis.literals)
+
+    # --- points
+
+    def value(self, axis: Axis, point: Mapping[str, Fraction]) -> Fraction:
+        """Return the value of an axis at a point of the inputs."""
+        if axis.is_input:
+            return point[axis.name]
+        total = axis.constant
+        for name, weight in axis.weights.items():
+            total += weight * point[name]
+        return total
+
+    def contains(self, point: Mapping[str, Fraction]) -> bool:
+        """Return whether a point is in the domain, of values that rows can have."""
+        if not all(axis.contains(point[name]) for name, axis in self.inputs.items()):
+            return False
+        return all(
+            axis.low <= self.value(axis, point) <= axis.high
+            for name, axis in self.axes.items()
+            if not axis.is_input and self.domain.side(name) is not None
+        )
+
+    def strengths(
+        self, point: Mapping[str, Fraction], of: Iterable[int] | None = None
+    ) -> tuple[list[Fraction], list[Fraction]]:
+        """Return bounds of strengths at a point, equal where degrees are fractions.
+
+        Args:
+            point: A value for each input.
+            of: The positions of the rules that are asked; all by default. The others
+                are 0.
+        """
+        degrees: dict[tuple[str, Literal], tuple[Fraction, Fraction]] = {}
+        values: dict[str, Fraction] = {}
+        low, high = [ZERO] * self.count, [ZERO] * self.count
+        for place in range(self.count) if of is None else of:
+            rule = self.rules[place]
+            least = most = rule.factor
+            for key in rule.literals:
+                if key not in degrees:
+                    name, literal = key
+                    if name not in values:
+                        values[name] = self.value(self.axes[name], point)
+                    degrees[key] = literal_bounds(literal, values[name])
+                a, b = degrees[key]
+                if rule.norm == "product":
+                    least, most = least * a, most * b
+                else:
+                    least, most = min(least, a), min(most, b)
+                if not most:
+                    break
+            low[place], high[place] = least, most
+        return low, high
+
+    def point(self, values: Mapping[str, Fraction]) -> dict[str, Fraction] | None:
+        """Return a point of the inputs at which axes that are free have values."""
+        result: dict[str, Fraction] = {}
+        for name, x in values.items():
+            axis = self.axes[name]
+            if axis.is_input:
+                result[name] = x
+                continue
+            left = x - axis.constant
+            ends = {
+                of: sorted((w * self.inputs[of].least, w * self.inputs[of].largest))
+                for of, w in axis.weights.items()
+            }
+            left -= sum((low for low, _ in ends.values()), ZERO)
+            for of, weight in axis.weights.items():
+                low, high = ends[of]
+                step = min(high - low, max(left, ZERO))
+                left -= step
+                value = (low + step) / weight
+                if result.setdefault(of, value) != value:
+                    return None
+            if left:
+                return None
+        for name, axis in self.inputs.items():
+            if name not in result:
+                result[name] = _plain(axis)
+        return result
+
+    # --- doubles: points that are drawn, which find most witnesses
+
+    @cached_property
+    def samples(self) -> list[list[Fraction]]:
+        """Values of each input at points that rows can have; half of them at knots."""
+        chance = np.random.default_rng(self.seed)
+        columns: list[list[Fraction]] = []
+        for name, axis in self.inputs.items():
+            if axis.values:
+                picks = chance.integers(len(axis.values), size=SAMPLES)
+                columns.append([axis.values[n] for n in picks])
+                continue
+            share = chance.integers(_GRID, size=SAMPLES, endpoint=True)
+            width = axis.high - axis.low
+            drawn = [axis.low + width * Fraction(int(n), _GRID) for n in share]
+            places = self._places(name, axis)
+            if places:
+                picks = chance.integers(len(places), size=SAMPLES)
+                is_drawn = chance.random(SAMPLES) < 0.5
+                pairs = zip(drawn, picks, is_drawn, strict=True)
+                drawn = [x if keep else places[n] for x, n, keep in pairs]
+            if axis.is_whole:
+                drawn = [Fraction(round(x)) for x in drawn]
+            columns.append([x if axis.contains(x) else axis.high for x in drawn])
+        return columns
+
+    def _places(self, name: str, axis: Axis) -> list[Fraction]:
+        own = self.axes.get(name)
+        if own is None or not own.literals:
+            return [*axis.extra]
+        knots = [x for x in own.knots if axis.low <= x <= axis.high][:400]
+        middles = [(a + b) / 2 for a, b in itertools.pairwise(knots)]
+        return [*knots, *middles, *axis.extra]
+
+    def sample(self, number: int) -> dict[str, Fraction]:
+        """Return a sampled point, by its number."""
+        columns = zip(self.inputs, self.samples, strict=True)
+        return {name: column[number] for name, column in columns}
+
+    @cached_property
+    def sampled(self) -> FloatArray:
+        """The strengths at sampled points in doubles, shape (rules, points)."""
+        columns = {
+            name: np.array([float(x) for x in column])
+            for name, column in zip(self.inputs, self.samples, strict=True)
+        }
+        degrees: dict[tuple[str, Literal], FloatArray] = {}
+        for axis in self.used:
+            x = np.full(SAMPLES, float(axis.constant))
+            if axis.is_input:
+                x = columns[axis.name]
+            else:
+                for name, weight in axis.weights.items():
+                    x = x + float(weight) * columns[name]
+            for literal in axis.literals:
+                both = axis.bounds[literal]
+                degrees[axis.name, literal] = lines_at(both.lower, x)
+        result = np.empty((self.count, SAMPLES))
+        for place, rule in enumerate(self.rules):
+            strength = np.full(SAMPLES, float(rule.factor))
+            for key in rule.literals:
+                if rule.norm == "product":
+                    strength = strength * degrees[key]
+                else:
+                    strength = np.minimum(strength, degrees[key])
+            result[place] = strength
+        if self.is_coupled:
+            result[:, ~self._inside(columns)] = 0.0
+        return result
+
+    def _inside(self, columns: Mapping[str, FloatArray]) -> BoolArray:
+        inside = np.ones(SAMPLES, dtype=bool)
+        for name, axis in self.axes.items():
+            if not axis.is_input and self.domain.side(name) is not None:
+                x = np.full(SAMPLES, float(axis.constant))
+                for of, weight in axis.weights.items():
+                    x = x + float(weight) * columns[of]
+                inside &= (x >= float(axis.low)) & (x <= float(axis.high))
+        return inside
+
+
+def lines_at(lines: Lines, x: FloatArray) -> FloatArray:
+    """Return about the values of lines at some places, knots included."""
+    xs = np.array([float(v) for v in lines.x])
+    at = np.array([float(v) for v in lines.at])
+    if len(xs) == 1:
+        return np.full_like(x, at[0])
+    piece = np.clip(np.searchsorted(xs, x, "right") - 1, 0, len(xs) - 2)
+    p = np.array([float(v) for v in lines.after])[piece]
+    q = np.array([float(v) for v in lines.before])[piece]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.clip((x - xs[piece]) / (xs[piece + 1] - xs[piece]), 0.0, 1.0)
+    result = p + (q - p) * np.nan_to_num(share)
+    place = np.clip(np.searchsorted(xs, x), 0, len(xs) - 1)
+    outside = (x <= xs[0]) | (x >= xs[-1])
+    values: FloatArray = np.where((xs[place] == x) | outside, at[place], result)
+    return values
+
+
+def _plain(axis: Axis) -> Fraction:
+    """Return some value of an input on which nothing is wanted."""
+    if axis.values:
+        return axis.values[0]
+    x = (axis.low + axis.high) / 2
+    near = Fraction(f"{float(x):.3g}")
+    for tried in (near, Fraction(float(x)), Fraction(round(x)), x):
+        if axis.contains(tried):
+            return tried
+    return axis.high

@@ -1,0 +1,347 @@
+"""Boxes: branch and bound for products, curves and outputs, rounded outwards.
+
+Where a position lies on an axis is counted in knots: at a whole number it is a knot,
+between two of them a place on the lines between. Degrees on a stretch of positions are
+bounded by values and limits at its ends and at the knots inside, kept in tables of
+extremes over runs of knots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from functools import cached_property
+from typing import Literal as Choice
+
+import numpy as np
+
+from fuzzytree.auditing.decide.answers import (
+    Answer,
+    Budget,
+    Open,
+    OutOfStepsError,
+    Point,
+    Proved,
+    Question,
+)
+from fuzzytree.auditing.decide.axes import Axis
+from fuzzytree.auditing.decide.base import Base
+from fuzzytree.auditing.decide.rules import Literal
+from fuzzytree.auditing.engine.lines import Lines
+from fuzzytree.model import BoolArray, FloatArray
+
+Side = Choice[0, 1]
+Factor = tuple[str, Literal]
+
+_SMALL = 2e-3  # of a piece between two knots: no box is halved further
+_MOST_SLIVERS = 500
+_LOOKS = 8  # boxes of each round whose middle is tried
+_ROUND = 1e-13  # more than a sum or product of a few doubles is rounded by
+
+
+class Stretches:
+    """The literals of an axis on stretches of it."""
+
+    def __init__(self, axis: Axis) -> None:
+        self.axis = axis
+        self.x = [*axis.values] or [x for x in axis.knots if axis.low <= x <= axis.high]
+        self.last = len(self.x) - 1
+        self.sides = {
+            literal: (self._floats(both.lower), self._floats(both.upper))
+            for literal, both in axis.bounds.items()
+        }
+        self._tables: dict[tuple[int, bool], FloatArray] = {}
+
+    def _floats(self, lines: Lines) -> tuple[FloatArray, FloatArray, FloatArray]:
+        start = lines.x.index(self.x[0])
+        at = np.array([float(v) for v in lines.at[start : start + self.last + 1]])
+        if self.axis.values:
+            return at, at[:-1], at[1:]
+        after, before = (
+            np.array([float(v) for v in side[start : start + self.last]])
+            for side in (lines.after, lines.before)
+        )
+        return at, after, before
+
+    def range(
+        self, literal: Literal, low: FloatArray, high: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of a literal's degrees on stretches of positions."""
+        lower, upper = self.sides[literal]
+        least = self._extreme(lower, low, high, is_most=False)
+        most = self._extreme(upper, low, high, is_most=True)
+        return (
+            np.where(least >= 1.0, 1.0, np.clip(least - _ROUND, 0.0, None)),
+            np.where(most <= 0.0, 0.0, most + _ROUND),
+        )
+
+    def _extreme(
+        self,
+        part: tuple[FloatArray, FloatArray, FloatArray],
+        low: FloatArray,
+        high: FloatArray,
+        *,
+        is_most: bool,
+    ) -> FloatArray:
+        at, after, before = part
+        pick = np.maximum if is_most else np.minimum
+        if not self.last:
+            return np.full_like(low, at[0])
+        first, last = np.floor(low).astype(int), np.ceil(high).astype(int)
+        piece = np.minimum(first, self.last - 1)
+        end = np.maximum(last - 1, 0)
+        start = after[piece] + (before[piece] - after[piece]) * (low - piece)
+        on_first = np.where(high > first, pick(at[first], after[piece]), at[first])
+        start = np.where(low == first, on_first, start)
+        stop = after[end] + (before[end] - after[end]) * (high - end)
+        on_last = np.where(low < last, pick(at[last], before[end]), at[last])
+        stop = np.where(high == last, on_last, stop)
+        result: FloatArray = pick(start, stop)
+        # knots strictly inside: their values, with both limits
+        u = np.floor(low).astype(int) + 1
+        v = np.ceil(high).astype(int) - 1
+        inside = v >= u
+        count = np.where(inside, v - u + 1, 1)
+        level = np.log2(count).astype(int)
+        table = self._table(part, is_most=is_most)
+        u = np.where(inside, u, 0)
+        back = np.where(inside, v - 2**level + 1, 0)
+        extreme = pick(table[level, u], table[level, back])
+        result = np.where(inside, pick(result, extreme), result)
+        return result
+
+    def _table(
+        self, part: tuple[FloatArray, FloatArray, FloatArray], *, is_most: bool
+    ) -> FloatArray:
+        """Return extremes over 2**k knots from each on, with their limits."""
+        key = id(part), is_most
+        if key not in self._tables:
+            at, after, before = part
+            pick = np.maximum if is_most else np.minimum
+            row = at.copy()
+            row[:-1] = pick(row[:-1], after)
+            row[1:] = pick(row[1:], before)
+            rows = [row]
+            while 2 ** len(rows) <= len(at):
+                step = 2 ** (len(rows) - 1)
+                last = rows[-1]
+                rows.append(
+                    np.concatenate([pick(last[:-step], last[step:]), last[-step:]])
+                )
+            self._tables[key] = np.array(rows)
+        return self._tables[key]
+
+    @cached_property
+    def widths(self) -> FloatArray:
+        """How far it is from each knot to the next."""
+        return np.diff(np.array([float(x) for x in self.x]))
+
+    def slope(
+        self, literal: Literal, low: FloatArray, high: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of the slope of an exact literal; infinite at a jump."""
+        at, after, before = self.sides[literal][0]
+        slopes = (before - after) / self.widths
+        jumps = np.zeros((2, self.last + 1))
+        for side, pick in ((0, np.minimum), (1, np.maximum)):
+            jumps[side, :-1] = pick(after - at[:-1], 0.0)
+            jumps[side, 1:] = pick(jumps[side, 1:], pick(at[1:] - before, 0.0))
+        endless = np.where(np.abs(jumps) > 1e-15, np.sign(jumps) * np.inf, 0.0)
+        least, most = np.empty_like(low), np.empty_like(low)
+        first, last = np.floor(low).astype(int), np.ceil(high).astype(int)
+        for n, (u, v) in enumerate(zip(first, last, strict=True)):
+            inner = slopes[u : max(v, u + 1)]
+            least[n] = min(inner.min(), endless[0, u : v + 1].min())
+            most[n] = max(inner.max(), endless[1, u : v + 1].max())
+        return least, most
+
+    def value(self, position: float) -> Fraction:
+        """Return the exact value at a position; of single values the nearest one."""
+        if self.axis.values:
+            return self.x[round(position)]
+        piece = min(int(position), self.last)
+        if piece == self.last:
+            return self.x[self.last]
+        x = self.x[piece] + (self.x[piece + 1] - self.x[piece]) * (
+            Fraction(position) - piece
+        )
+        return Fraction(round(x)) if self.axis.is_whole else x
+
+    def split(self, low: float, high: float) -> tuple[float, float]:
+        """Return where the first half of a stretch ends, and the second begins."""
+        if self.axis.values:
+            middle = int(low + high) // 2
+            return float(middle), float(middle + 1)
+        middle_place = (low + high) / 2
+        if high - low > 1.5:
+            middle_place = float(round(middle_place))
+        return middle_place, middle_place
+
+
+class Boxes:
+    """Boxes of an axis-parallel domain: bounds of degrees and strengths on each.
+
+    Attributes:
+        low: The lower ends in positions, shape (boxes, axes).
+        high: The upper ones.
+    """
+
+    def __init__(
+        self,
+        base: Base,
+        stretches: Mapping[str, Stretches],
+        low: FloatArray,
+        high: FloatArray,
+    ) -> None:
+        self.base, self.low, self.high = base, low, high
+        self.stretches = stretches
+        self.places = {name: n for n, name in enumerate(stretches)}
+        self._degrees: dict[Factor, tuple[FloatArray, FloatArray]] = {}
+
+    def degree(self, name: str, literal: Literal) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of a literal's degrees on each box."""
+        key = name, literal
+        if key not in self._degrees:
+            place = self.places[name]
+            self._degrees[key] = self.stretches[name].range(
+                literal, self.low[:, place], self.high[:, place]
+            )
+        return self._degrees[key]
+
+    def slope(self, name: str, literal: Literal) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of the slope of an exact literal on each box."""
+        place = self.places[name]
+        return self.stretches[name].slope(
+            literal, self.low[:, place], self.high[:, place]
+        )
+
+    def strength(
+        self, rule: int, side: Side, without: frozenset[Factor] = frozenset()
+    ) -> FloatArray:
+        """Return bounds of a rule's strength on boxes: from below 0, from above 1."""
+        one = self.base.rules[rule]
+        result = np.full(len(self.low), float(one.factor))
+        for name, literal in one.literals:
+            if (name, literal) in without:
+                continue
+            degree = self.degree(name, literal)[side]
+            if one.norm == "product":
+                result = result * degree
+            else:
+                result = np.minimum(result, degree)
+        return result
+
+
+def search_boxes(
+    base: Base,
+    is_excluded: Callable[[Boxes], BoolArray],
+    accepts: Callable[[dict[str, Fraction]], bool],
+    budget: Budget,
+    steps: int = 4_000_000,
+) -> Answer:
+    """Halve boxes until each is excluded, or a point is accepted.
+
+    Args:
+        base: Rules whose axes share no inputs.
+        is_excluded: Which boxes have no point for certain.
+        accepts: Whether a point is one, exactly.
+        budget: The budget of the caller.
+        steps: The most steps that this search takes.
+
+    Raises:
+        OutOfStepsError: If the budget is spent.
+    """
+    if base.is_coupled or any(axis.extra for axis in base.used):
+        return Open("axes share inputs, or have a value beside their range")
+    own = Budget(steps, budget)
+    stretches = {axis.name: Stretches(axis) for axis in base.used}
+    ends = [[0.0] * len(stretches), [float(s.last) for s in stretches.values()]]
+    boxes = np.array([ends])
+    seen = slivers = 0
+    while len(boxes):
+        try:
+            own.spend(len(boxes) * (10 + 4 * base.count))
+        except OutOfStepsError:
+            if budget.is_spent:
+                raise
+            return Open(f"{len(boxes)} boxes are left")
+        seen += len(boxes)
+        excluded = is_excluded(Boxes(base, stretches, boxes[:, 0], boxes[:, 1]))
+        boxes = boxes[~excluded]
+        for box in boxes[:_LOOKS]:
+            values = {
+                name: stretch.value(float(low + high) / 2)
+                for (name, stretch), low, high in zip(
+                    stretches.items(), box[0], box[1], strict=True
+                )
+            }
+            point = base.point(values)
+            if point is not None and base.contains(point) and accepts(point):
+                return Point(point, f"{seen} boxes")
+        width = boxes[:, 1] - boxes[:, 0]
+        small = width.max(axis=1, initial=0.0) < _SMALL
+        slivers += int(small.sum())
+        boxes, width = boxes[~small], width[~small]
+        if slivers > _MOST_SLIVERS:
+            return Open("they touch on too many small boxes")
+        if len(boxes):
+            boxes = _halved(boxes, width, [*stretches.values()])
+    return (
+        Open(f"{slivers} small boxes are left") if slivers else Proved(f"{seen} boxes")
+    )
+
+
+def _halved(
+    boxes: FloatArray, width: FloatArray, stretches: list[Stretches]
+) -> FloatArray:
+    rows, longest = np.arange(len(boxes)), width.argmax(axis=1)
+    cuts = np.array(
+        [
+            stretches[place].split(boxes[row, 0, place], boxes[row, 1, place])
+            for row, place in zip(rows, longest, strict=True)
+        ]
+    )
+    left, right = boxes.copy(), boxes.copy()
+    left[rows, 1, longest], right[rows, 0, longest] = cuts.T
+    return np.concatenate([left, right])
+
+
+def by_boxes(base: Base, question: Question, budget: Budget) -> Answer:
+    """Decide a question on boxes; factors that two products share are cancelled.
+
+    Raises:
+        OutOfStepsError: If the budget is spent.
+    """
+    fine = base.fine
+    factors = [frozenset(rule.literals) for rule in base.rules]
+    twice = [len(rule.literals) > len(set(rule.literals)) for rule in base.rules]
+    level = None if question.level is None else float(question.level)
+    most, least = 1.0 + 1e-12, 1.0 - 1e-12
+
+    def is_excluded(boxes: Boxes) -> BoolArray:
+        out = np.zeros(len(boxes.low), dtype=bool)
+        for i in question.reach:
+            top = boxes.strength(i, 1)
+            out |= top <= 0.0 if level is None else top < level * least
+            for j in (*question.rivals, *question.weak) if level is None else ():
+                shared: frozenset[Factor] = frozenset()
+                one, other = base.rules[i], base.rules[j]
+                if one.norm == other.norm == "product" and not (twice[i] or twice[j]):
+                    shared = factors[i] & factors[j]
+                mine = boxes.strength(i, 1, shared)
+                theirs = boxes.strength(j, 0, shared)
+                out |= mine < theirs * least
+                if j in question.rivals:
+                    is_never = one.norm == other.norm and one.factor <= other.factor
+                    if is_never and factors[j] <= factors[i] and not twice[j]:
+                        out |= True
+                    out |= (theirs >= 1.0) & (mine <= 1.0) & (one.factor <= 1)
+        if level is not None:
+            for j in (*question.rivals, *question.weak):
+                out |= boxes.strength(j, 0) > level * most
+        return out
+
+    def accepts(point: dict[str, Fraction]) -> bool:
+        return question.holds(*base.strengths(point, question.rules))
+
+    return search_boxes(fine, is_excluded, accepts, budget)
