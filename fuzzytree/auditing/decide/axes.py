@@ -18,6 +18,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple, cast
 
+import numpy as np
+
 from fuzzytree.auditing.decide.answers import ONE, ZERO
 from fuzzytree.auditing.decide.rules import Literal
 from fuzzytree.auditing.engine.lines import (
@@ -27,7 +29,7 @@ from fuzzytree.auditing.engine.lines import (
     degree_within,
     lines_of,
 )
-from fuzzytree.model import Curve, MembershipFunction
+from fuzzytree.model import Curve, IntArray, MembershipFunction
 from fuzzytree.numerics import degree_between
 
 MOST_WHOLE = 64
@@ -94,11 +96,26 @@ class Axis:
         self.literals: dict[Literal, int] = {}
         self.most_pieces = MOST_PIECES
         self._tables: dict[int, list[Cell]] = {}
+        self._restricted: dict[frozenset[Literal], Axis] = {}
 
     def set_values(self, values: Iterable[Fraction]) -> None:
         """Let rows have only some values."""
         self.values = tuple(sorted(set(values)))
         self.low, self.high = self.values[0], self.values[-1]
+
+    def with_literals(self, literals: frozenset[Literal]) -> Axis:
+        """Return the same axis with some of its literals; it is made once."""
+        if literals not in self._restricted:
+            axis = Axis(self.name, self.weights, self.constant, (self.low, self.high))
+            axis.is_open, axis.is_whole = self.is_open, self.is_whole
+            axis.values, axis.extra = self.values, self.extra
+            own = {
+                one: users for one, users in self.literals.items() if one in literals
+            }
+            axis.literals = own
+            axis.parts = {one: self.parts[one] for one in own}
+            self._restricted[literals] = axis
+        return self._restricted[literals]
 
     @property
     def is_input(self) -> bool:
@@ -169,6 +186,12 @@ class Axis:
         return self._arranged[0]
 
     @cached_property
+    def bends(self) -> list[Fraction]:
+        """Where a function of a literal bends or jumps, and the ends, in order."""
+        ends = self.low, self.high, self.least, self.largest
+        return _sorted([*ends, *(x for one in self._distinct for x in one.x)])
+
+    @cached_property
     def is_crossed(self) -> bool:
         """Whether all crossings are knots, as levels need; not with too many lines."""
         if self.values:
@@ -179,28 +202,29 @@ class Axis:
     @cached_property
     def _distinct(self) -> list[Lines]:
         every = (one for sides in self.parts.values() for side in sides for one in side)
-        return [*dict.fromkeys(every)]
+        return _once(every)
 
     @cached_property
     def _arranged(self) -> tuple[tuple[Fraction, ...], dict[Literal, Between]]:
-        ends = {self.low, self.high, self.least, self.largest}
-        xs = sorted(ends.union(*(one.x for one in self._distinct)))
+        xs = self.bends
         if self.values:
             xs = [*self.values]
-            lines = {one: _sampled(one, xs) for one in self._distinct}
+            lines = {id(one): _sampled(one, xs) for one in self._distinct}
         else:
-            lines = {one: _refined(one, xs) for one in self._distinct}
+            lines = {id(one): _refined(one, xs) for one in self._distinct}
             if self.is_crossed:
-                more = sorted({*xs, *_crossings([*lines.values()])})
-                if len(more) > len(xs):
-                    xs = more
-                    lines = {one: _refined(on, xs) for one, on in lines.items()}
+                more = [*_crossings([*lines.values()])]
+                if more:
+                    xs = _sorted([*xs, *more])
+                    lines = {name: _refined(one, xs) for name, one in lines.items()}
         result: dict[Literal, Between] = {}
         for literal, (lower, upper) in self.parts.items():
             pick = min if literal.negated else max
-            low = _extreme([lines[one] for one in lower], pick)
+            low = _extreme([lines[id(one)] for one in lower], pick)
             is_exact = all(a is b for a, b in zip(lower, upper, strict=True))
-            high = low if is_exact else _extreme([lines[one] for one in upper], pick)
+            high = (
+                low if is_exact else _extreme([lines[id(one)] for one in upper], pick)
+            )
             result[literal] = Between(low, high)
         return tuple(xs), result
 
@@ -209,28 +233,29 @@ class Axis:
     @cached_property
     def levels(self) -> tuple[Fraction, ...]:
         """The critical levels, in order."""
-        lines = [*dict.fromkeys(one for two in self.bounds.values() for one in two)]
-        values = {v for x in self.extra for one in lines for v in (value_at(one, x),)}
+        lines = _once(one for two in self.bounds.values() for one in two)
+        values = [value_at(one, x) for x in self.extra for one in lines]
         last = len(self.knots) - 1
         for k in range(last + 1):
             if self.values:
-                values.update(one.at[k] for one in lines)
+                values += [one.at[k] for one in lines]
                 continue
+            before, after = max(k - 1, 0), min(k, last - 1)
             around = [
-                (one.at[k], *one.before[max(k - 1, 0) : k], *one.after[k : k + 1])
+                (one.at[k], *one.before[before:k], *one.after[k : k + 1])
                 for one in lines
             ]
-            if k in (0, last) or any(len(set(each)) > 1 for each in around):
-                values.update(*around)
+            if k in (0, last) or any(len({*each}) > 1 for each in around):
+                values += [v for each in around for v in each]
                 continue
+            a, b = self.knots[k] - self.knots[before], self.knots[k + 1] - self.knots[k]
             seen: dict[Fraction, int] = {}
-            a = self.knots[k] - self.knots[k - 1]
-            b = self.knots[k + 1] - self.knots[k]
             for one, (v, *_) in zip(lines, around, strict=True):
-                is_bent = (v - one.after[k - 1]) * b != (one.before[k] - v) * a
+                p, q = one.after[before], one.before[after]
+                is_bent = p != v if v == q else (v - p) * b != (q - v) * a
                 seen[v] = seen.get(v, 0) + 1 + is_bent
-            values.update(v for v, count in seen.items() if count > 1)
-        return tuple(sorted(values))
+            values += [v for v, count in seen.items() if count > 1]
+        return tuple(_sorted(values))
 
     def place(self, level: Fraction) -> int:
         """Return the number of a level: odd on a critical one, even between two."""
@@ -257,85 +282,142 @@ class Axis:
         return self._tables[place]
 
     def cells_at(self, level: Fraction) -> Iterator[Cell]:
-        """Yield all cells at a level."""
-        literals = [(users, *self.bounds[one]) for one, users in self.literals.items()]
-        every = -1
+        """Yield the cells at a level; of those with equal masks one at least."""
+        ranks = self._ranks
+        rank = ranks.of(level)
         for x in self.extra:
-            yield Cell(self._masks(literals, x, level), x, is_wide=False)
-        for k, x in enumerate(self.knots):
-            if not self.values and not self.low <= x <= self.high:
-                continue
-            if self.values or self.contains(x):
-                below = [every] * 4
-                for users, low, high in literals:
-                    _exclude(below, users, low.at[k], high.at[k], level)
-                yield Cell(Masks(*below), x, is_wide=False)
-            if not self.values and x < self.high:
-                yield from self._between(k, literals, level)
+            values = [value_at(one, x) for one in ranks.lines]
+            states = [(v > level) - (v < level) for v in values]
+            yield Cell(self._masks(states), x, is_wide=False)
+        for column, places in _distinct(np.sign(ranks.at - rank)):
+            for place in places:
+                x = self.knots[place]
+                if self.contains(x) and (self.values or self.low <= x <= self.high):
+                    yield Cell(self._masks(column), x, is_wide=False)
+                    break
+        if self.values or len(self.knots) == 1:
+            return
+        first, last = (bisect_left(self.knots, x) for x in (self.low, self.high))
+        after, before = ranks.after[:, first:last], ranks.before[:, first:last]
+        states = np.sign(np.sign(after - rank) + np.sign(before - rank))
+        passes = np.sign(after - rank) * np.sign(before - rank) < 0
+        for k in np.flatnonzero(passes.any(axis=0)).tolist():
+            is_cut = passes[:, k].tolist()
+            yield from self._cut(first + k, states[:, k].tolist(), is_cut, level)
+        plain = np.flatnonzero(~passes.any(axis=0))
+        for column, places in _distinct(states[:, plain]):
+            x = self._inside(
+                (self.knots[first + k], self.knots[first + k + 1])
+                for k in plain[places].tolist()
+            )
+            yield Cell(self._masks(column), x, is_wide=True)
 
-    def _between(
-        self, k: int, literals: Sequence[tuple[int, Lines, Lines]], level: Fraction
+    def _cut(
+        self, k: int, states: list[int], is_cut: Sequence[bool], level: Fraction
     ) -> Iterator[Cell]:
-        """Yield the cells between two knots."""
+        """Yield the cells between two knots, where some literals pass a level."""
         a, b = self.knots[k], self.knots[k + 1]
-        cuts: set[Fraction] = set()
-        crossing: list[tuple[int, Lines, Lines]] = []
-        fixed = [-1] * 4
-        for users, low, high in literals:
-            passes = False
-            for one in (low,) if low is high else (low, high):
-                p, q = one.after[k], one.before[k]
-                if p < level < q or q < level < p:
-                    cuts.add(a + (b - a) * (level - p) / (q - p))
-                    passes = True
-            if passes:
-                crossing.append((users, low, high))
-            else:  # within the piece it stays on one side: its middle stands for it
-                ends = [(one.after[k] + one.before[k]) / 2 for one in (low, high)]
-                _exclude(fixed, users, ends[0], ends[1], level)
-        order = [a, *sorted(cuts), b]
-        for n, (first, last) in enumerate(itertools.pairwise(order)):
-            places = [((first + last) / 2, True)]
-            if n:
-                places.insert(0, (first, False))
-            for x, is_wide in places:
-                masks = [*fixed]
-                share = (x - a) / (b - a)
-                for users, low, high in crossing:
-                    values = [
-                        one.after[k] + (one.before[k] - one.after[k]) * share
-                        for one in (low, high)
-                    ]
-                    _exclude(masks, users, values[0], values[1], level)
-                if self.is_whole:
-                    whole = Fraction(math.floor(first) + 1)
-                    x = whole if is_wide and whole < last else x
-                yield Cell(Masks(*masks), x, is_wide)
+        cuts: dict[int, tuple[Fraction, int]] = {}
+        for n, line in enumerate(self._ranks.lines):
+            if is_cut[n]:
+                p, q = line.after[k], line.before[k]
+                way = 1 if p < q else -1
+                cuts[n] = a + (b - a) * (level - p) / (q - p), way
+        order = [a, *sorted({cut for cut, _ in cuts.values()}), b]
+        for first, last in itertools.pairwise(order):
+            if first > a:
+                for n, (cut, way) in cuts.items():
+                    states[n] = way * ((first > cut) - (first < cut))
+                yield Cell(self._masks(states), first, is_wide=False)
+            for n, (cut, way) in cuts.items():
+                states[n] = way if first >= cut else -way
+            x = self._inside([(first, last)])
+            yield Cell(self._masks(states), x, is_wide=True)
 
-    def _masks(
-        self,
-        literals: Sequence[tuple[int, Lines, Lines]],
-        x: Fraction,
-        level: Fraction,
-    ) -> Masks:
+    def _inside(self, pieces: Iterable[tuple[Fraction, Fraction]]) -> Fraction:
+        """Return a value strictly inside of one of some pieces, whole if need be."""
+        x = ZERO
+        for n, (first, last) in enumerate(pieces):
+            x = x if n else (first + last) / 2
+            if not self.is_whole:
+                break
+            if math.floor(first) + 1 < last:
+                return Fraction(math.floor(first) + 1)
+        return x
+
+    @cached_property
+    def _ranks(self) -> _Ranks:
+        both = [self.bounds[literal] for literal in self.literals]
+        lines = [one.lower for one in both] + [one.upper for one in both]
+        return _Ranks(lines)
+
+    def _masks(self, states: Sequence[int]) -> Masks:
+        """Return masks from where each lower and each upper line is: -1 is below."""
         masks = [-1] * 4
-        for users, low, high in literals:
-            _exclude(masks, users, value_at(low, x), value_at(high, x), level)
+        count = len(self.literals)
+        for n, users in enumerate(self.literals.values()):
+            for place, state in ((0, states[n]), (2, states[count + n])):
+                if state <= 0:
+                    masks[place + 1] &= ~users
+                    if state < 0:
+                        masks[place] &= ~users
         return Masks(*masks)
 
 
-def _exclude(
-    masks: list[int], users: int, low: Fraction, high: Fraction, level: Fraction
-) -> None:
-    """Take the rules of a literal out of masks, where its degree does not suffice."""
-    if low <= level:
-        masks[1] &= ~users
-        if low < level:
-            masks[0] &= ~users
-    if high <= level:
-        masks[3] &= ~users
-        if high < level:
-            masks[2] &= ~users
+class _Ranks:
+    """Values of lines at and between knots, by their place among all of them."""
+
+    def __init__(self, lines: Sequence[Lines]) -> None:
+        self.lines = lines
+        every = [v for side in (1, 2, 3) for one in lines for v in one[side]]
+        self.values, places = _ranked(every)
+        ranks = 2 * np.array(places, dtype=np.int64) + 1
+        count, size = len(lines), len(lines[0].x)
+        ends = count * size, count * (2 * size - 1)
+        self.at = ranks[: ends[0]].reshape(count, size)
+        self.after = ranks[ends[0] : ends[1]].reshape(count, size - 1)
+        self.before = ranks[ends[1] :].reshape(count, size - 1)
+
+    def of(self, level: Fraction) -> int:
+        """Return the rank of a level: even if it is none of the values."""
+        at = bisect_left(self.values, level)
+        return 2 * at + (at < len(self.values) and self.values[at] == level)
+
+
+def _ranked(values: Sequence[Fraction]) -> tuple[list[Fraction], list[int]]:
+    """Return the different values in order, and the place of each value among them."""
+    near = [float(v) for v in values]
+    order = sorted(range(len(values)), key=near.__getitem__)
+    places, result = [0] * len(values), list[Fraction]()
+    for _, group in itertools.groupby(order, key=near.__getitem__):
+        some = [*group]
+        first = values[some[0]]
+        if any(values[n] != first for n in some):  # doubles do not tell them apart
+            some.sort(key=values.__getitem__)
+        for n in some:
+            if not result or values[n] != result[-1]:
+                result.append(values[n])
+            places[n] = len(result) - 1
+    return result, places
+
+
+def _sorted(values: Sequence[Fraction]) -> list[Fraction]:
+    """Return the different values in order."""
+    return _ranked(values)[0]
+
+
+def _once(lines: Iterable[Lines]) -> list[Lines]:
+    return [*{id(one): one for one in lines}.values()]
+
+
+def _distinct(columns: IntArray) -> Iterator[tuple[list[int], IntArray]]:
+    """Yield the different columns of a table, and where each of them stands."""
+    places: dict[bytes, list[int]] = {}
+    rows = np.ascontiguousarray(columns.T.astype(np.int8))
+    for k, row in enumerate(rows):
+        places.setdefault(row.tobytes(), []).append(k)
+    for where in places.values():
+        yield columns[:, where[0]].tolist(), np.array(where, dtype=np.int64)
 
 
 # --- functions of lines

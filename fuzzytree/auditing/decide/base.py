@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
@@ -309,7 +310,7 @@ class Base:
         own = self.axes.get(name)
         if own is None or not own.literals:
             return [*axis.extra]
-        knots = [x for x in own.knots if axis.low <= x <= axis.high][:400]
+        knots = [x for x in own.bends if axis.low <= x <= axis.high][:400]
         middles = [(a + b) / 2 for a, b in itertools.pairwise(knots)]
         return [*knots, *middles, *axis.extra]
 
@@ -333,9 +334,10 @@ class Base:
             else:
                 for name, weight in axis.weights.items():
                     x = x + float(weight) * columns[name]
-            for literal in axis.literals:
-                both = axis.bounds[literal]
-                degrees[axis.name, literal] = lines_at(both.lower, x)
+            for literal, (lower, _) in axis.parts.items():
+                pick = np.minimum if literal.negated else np.maximum
+                each = [lines_at(lines, x) for lines in lower]
+                degrees[axis.name, literal] = functools.reduce(pick, each)
         result = np.empty((self.count, SAMPLES))
         for place, rule in enumerate(self.rules):
             strength = np.full(SAMPLES, float(rule.factor))

@@ -167,16 +167,6 @@ class Stretches:
         )
         return Fraction(round(x)) if self.axis.is_whole else x
 
-    def split(self, low: float, high: float) -> tuple[float, float]:
-        """Return where the first half of a stretch ends, and the second begins."""
-        if self.axis.values:
-            middle = int(low + high) // 2
-            return float(middle), float(middle + 1)
-        middle_place = (low + high) / 2
-        if high - low > 1.5:
-            middle_place = float(round(middle_place))
-        return middle_place, middle_place
-
 
 class Boxes:
     """Boxes of an axis-parallel domain: bounds of degrees and strengths on each.
@@ -294,15 +284,16 @@ def search_boxes(
 def _halved(
     boxes: FloatArray, width: FloatArray, stretches: list[Stretches]
 ) -> FloatArray:
+    """Return both halves of boxes, which are halved where they are longest."""
     rows, longest = np.arange(len(boxes)), width.argmax(axis=1)
-    cuts = np.array(
-        [
-            stretches[place].split(boxes[row, 0, place], boxes[row, 1, place])
-            for row, place in zip(rows, longest, strict=True)
-        ]
-    )
+    has_values = np.array([bool(one.axis.values) for one in stretches])[longest]
+    low, high = boxes[rows, 0, longest], boxes[rows, 1, longest]
+    middle = (low + high) / 2
+    middle = np.where(high - low > 1.5, np.round(middle), middle)
+    middle = np.where(has_values, np.floor((low + high) / 2), middle)
     left, right = boxes.copy(), boxes.copy()
-    left[rows, 1, longest], right[rows, 0, longest] = cuts.T
+    left[rows, 1, longest] = middle
+    right[rows, 0, longest] = middle + has_values
     return np.concatenate([left, right])
 
 

@@ -24,11 +24,9 @@ from fuzzytree.auditing.decide.answers import (
 )
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.boxes import by_boxes
-from fuzzytree.auditing.decide.levels import Levels, by_levels
+from fuzzytree.auditing.decide.levels import by_levels
 
 _LOOKS = 3  # sampled points that are evaluated in fractions
-_MOST_LEVELS = 4000
-_MOST_PAIRS = 4_000_000
 
 
 class Decider:
@@ -46,15 +44,7 @@ class Decider:
 
     def __init__(self, base: Base) -> None:
         self.base = base
-        self._levels: Levels | None = None
         self._exact: dict[int, dict[int, tuple[Fraction, Fraction]]] = {}
-
-    @property
-    def levels(self) -> Levels:
-        """The critical levels of all rules."""
-        if self._levels is None:
-            self._levels = Levels(self.base)
-        return self._levels
 
     def ask(self, question: Question, budget: Budget) -> Answer:
         """Decide a question.
@@ -71,13 +61,12 @@ class Decider:
         rules = [base.rules[i] for i in question.rules]
         answer: Answer = Open("no method applies")
         is_lattice = all(rule.norm == "minimum" for rule in rules)
-        is_crossed = all(axis.is_crossed for axis in base.used)
-        if is_lattice and is_crossed and len(self.levels.levels) <= _MOST_LEVELS:
-            answer = by_levels(self.levels, question, budget)
+        if is_lattice:
+            answer = by_levels(base, question, budget)
         is_settled = is_lattice and base.is_exact
         if isinstance(answer, Open) and not base.is_coupled and not is_settled:
             answer = by_boxes(base, question, budget)
-        if isinstance(answer, Open):
+        if isinstance(answer, Open) and (base.is_coupled or not is_lattice):
             return self._solved(question, budget, answer)
         return answer
 

@@ -5,14 +5,13 @@ the level there. A point is one cell of each axis, and a rule reaches the level 
 if its bit is in all masks. So a walk over the axes that keeps the smallest masks of
 rivals decides a level, and one level between each two critical ones decides all.
 
-Rivals join the question only when a point needs them: the few that suffice for a proof
-come out with it.
+Rivals join the question only when a point needs them, the strongest first: so axes have
+few literals and few levels, and the rivals that suffice for a proof come out with it.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
 from fuzzytree.auditing.decide.answers import (
@@ -27,57 +26,53 @@ from fuzzytree.auditing.decide.answers import (
 )
 from fuzzytree.auditing.decide.axes import Axis, Cell
 from fuzzytree.auditing.decide.base import Base
+from fuzzytree.auditing.decide.rules import Literal
 
 _MOST_LAYERS = 20_000
 
+_Choice = dict[str, tuple[Cell, int]]
+_Ceiling = tuple[Fraction, bool]  # a level, and whether it is itself still to be tried
+_TOP: _Ceiling = (ONE + 1, False)
+
 
 class _TooManyError(Exception):
-    """There are more smallest masks than are kept."""
+    """There are more levels, lines or smallest masks than are looked at."""
 
 
-class Levels:
-    """The critical levels of all rules of a base that take the minimum."""
+_MOST_LEVELS = 4_000
 
-    def __init__(self, base: Base) -> None:
+
+class LevelView:
+    """Some rules of a base that take the minimum, on axes with their literals alone."""
+
+    def __init__(self, base: Base, rules: Iterable[int]) -> None:
         self.base = base
-        own = {level for axis in base.used for level in axis.levels}
-        own |= {rule.factor for rule in base.rules}
-        self.levels = sorted({v for v in own if 0 < v <= 1} | {ZERO, ONE})
-        self.only: dict[tuple[str, object], int] = {}
-        for place, rule in enumerate(base.rules):
+        self.rules = tuple(sorted(set(rules)))
+        literals: dict[str, set[Literal]] = {}
+        self.alone: dict[tuple[str, Literal], int] = {}
+        factors = {ZERO, ONE}
+        for place in self.rules:
+            rule = base.rules[place]
+            factors.add(rule.factor)
             for name, literal in rule.literals:
+                literals.setdefault(name, set()).add(literal)
                 if sum(name == other for other, _ in rule.literals) == 1:
                     key = name, literal
-                    self.only[key] = self.only.get(key, 0) | 1 << place
-        self._cells: dict[tuple[str, int, int], list[Cell]] = {}
-
-    def tried(self, question: Question) -> list[Fraction]:
-        """Return the levels that stand for all, the highest first."""
-        if question.level is not None:
-            return [question.level]
-        middles = [(a + b) / 2 for a, b in itertools.pairwise(self.levels)]
-        if question.weak:
-            middles += self.levels[1:]
-        top = min((self.base.rules[i].factor for i in question.reach), default=ONE)
-        return sorted((level for level in middles if level <= top), reverse=True)
-
-    def cells(
-        self, axis: Axis, level: Fraction, ours: int, *, loose: bool
-    ) -> list[Cell]:
-        """Return the cells of an axis in which some rules reach a level."""
-        place = axis.place(level)
-        key = axis.name, 2 * place + loose, ours
-        if key not in self._cells:
-            self._cells[key] = [
-                cell
-                for cell in axis.cells(place)
-                if (cell.masks.perhaps if loose else cell.masks.surely) & ours == ours
-            ]
-        return self._cells[key]
+                    self.alone[key] = self.alone.get(key, 0) | 1 << place
+        self.axes = [
+            base.axes[name].with_literals(frozenset(own))
+            for name, own in literals.items()
+        ]
+        if not all(axis.is_crossed for axis in self.axes):
+            raise _TooManyError
+        own = factors.union(*(axis.levels for axis in self.axes))
+        self.levels = sorted(level for level in own if 0 <= level <= 1)
+        if len(self.levels) > _MOST_LEVELS:
+            raise _TooManyError
 
     def choice(
         self, question: Question, level: Fraction, budget: Budget, *, loose: bool
-    ) -> dict[str, tuple[Cell, int]] | None:
+    ) -> _Choice | None:
         """Return a cell of each axis in which together it is so, None if there is none.
 
         With `loose`, where degrees are enclosed, it may be so: none is a proof.
@@ -85,30 +80,28 @@ class Levels:
         Raises:
             _TooManyError: If there are too many masks.
         """
-        base = self.base
+        base, count = self.base, self.base.count
         ours = _bits(question.reach)
-        strict, weak = _bits(question.rivals), _bits(question.weak)
-        for place, rule in enumerate(base.rules):  # rules whose factor stays below
-            if rule.factor < level:
-                strict &= ~(1 << place)
-            if rule.factor <= level:
-                weak &= ~(1 << place)
-        count = base.count
+        strict = _bits(i for i in question.rivals if base.rules[i].factor >= level)
+        weak = _bits(i for i in question.weak if base.rules[i].factor > level)
         start = strict | weak << count
         options: list[tuple[str, dict[int, Cell]]] = []
-        for axis in base.used:
-            cells = self.cells(axis, level, ours, loose=loose)
-            budget.spend(4 * len(cells) + 4)
-            if not cells:
-                return None
-            keep = self._kept(axis, question) if loose else 0
+        for axis in self.axes:
+            kept = self._kept(axis, question) if loose else 0
             masks: dict[int, Cell] = {}
+            cells = axis.cells(axis.place(level))
+            budget.spend(2 * len(cells) + 4)
             for cell in cells:
+                mine = cell.masks.perhaps if loose else cell.masks.surely
+                if mine & ours != ours:
+                    continue
                 if loose:
-                    at, above = cell.masks.surely | keep, cell.masks.surely_above
+                    at, above = cell.masks.surely | kept, cell.masks.surely_above
                 else:
                     at, above = cell.masks.perhaps, cell.masks.perhaps_above
                 masks.setdefault((at & strict) | (above & weak) << count, cell)
+            if not masks:
+                return None
             options.append((axis.name, masks))
         layers: list[dict[int, tuple[int, int]]] = []
         states = [start]
@@ -125,7 +118,7 @@ class Levels:
                 raise _TooManyError
         if 0 not in states:
             return None
-        state, result = 0, dict[str, tuple[Cell, int]]()
+        state, result = 0, _Choice()
         for (name, masks), step in zip(
             reversed(options), reversed(layers), strict=True
         ):
@@ -142,29 +135,20 @@ class Levels:
         for place in question.reach:
             for name, literal in self.base.rules[place].literals:
                 if name == axis.name:
-                    result |= self.only.get((name, literal), 0)
+                    result |= self.alone.get((name, literal), 0)
         return result
 
-    def point(
-        self,
-        question: Question,
-        level: Fraction,
-        choice: dict[str, tuple[Cell, int]],
-        *,
-        loose: bool,
-    ) -> dict[str, Fraction] | None:
+    def point(self, level: Fraction, choice: _Choice) -> dict[str, Fraction] | None:
         """Return a point in chosen cells, taken at the very level."""
-        ours, values = _bits(question.reach), dict[str, Fraction]()
-        for name, (cell, _) in choice.items():
-            for other in self.base.axes[name].cells_at(level):
-                reached = other.masks.perhaps if loose else other.masks.surely
-                if other.masks == cell.masks and reached & ours == ours:
-                    values[name] = other.x
-                    break
+        values: dict[str, Fraction] = {}
+        for axis in self.axes:
+            masks = choice[axis.name][0].masks
+            cells = axis.cells_at(level)
+            values[axis.name] = next(c.x for c in cells if c.masks == masks)
         return self.base.point(values)
 
 
-def by_levels(levels: Levels, question: Question, budget: Budget) -> Answer:
+def by_levels(base: Base, question: Question, budget: Budget) -> Answer:
     """Decide a question level by level.
 
     Where degrees are enclosed, `Proved` holds for the curves themselves, and a point is
@@ -173,39 +157,75 @@ def by_levels(levels: Levels, question: Question, budget: Budget) -> Answer:
     Raises:
         OutOfStepsError: If the budget is spent.
     """
-    search = _Search(levels, question, budget)
     try:
-        return search.run()
+        return _Search(base, question, budget).run()
     except _TooManyError:
-        return Open("there are too many ways to choose cells")
+        return Open("there are too many levels, or ways to choose cells")
 
 
 class _Search:
-    def __init__(self, levels: Levels, question: Question, budget: Budget) -> None:
-        self.levels, self.question, self.budget = levels, question, budget
-        self.base = levels.base
+    def __init__(self, base: Base, question: Question, budget: Budget) -> None:
+        self.base, self.question, self.budget = base, question, budget
         self.asked: list[int] = []  # rivals and weak ones that joined
-        if self.base.is_coupled:
+        if base.is_coupled:
             self.asked = [*question.rivals, *question.weak]
+        self.view = self._view()
+        self.count = 0
+
+    def _view(self) -> LevelView:
+        return LevelView(self.base, (*self.question.reach, *self.asked))
 
     def run(self) -> Answer:
-        tried, is_open = self.levels.tried(self.question), False
-        for level in tried:
-            while (choice := self._choice(level, loose=True)) is not None:
-                if self.base.is_coupled:
-                    return Open("axes share inputs")
-                answer, rival = self._look(level, choice, loose=True)
-                if answer is None and rival is None:
-                    answer, rival = self._strictly(level)
-                if answer is not None:
-                    return answer
-                if rival is None:
-                    is_open = True
-                    break
-                self.asked.append(rival)
+        is_open, ceiling = False, _TOP
+        while True:
+            answer, rival, ceiling, is_left = self._descend(ceiling)
+            is_open |= is_left
+            if answer is not None:
+                return answer
+            if rival is None:
+                break
+            self.asked.append(rival)
+            self.view = self._view()
         if is_open:
             return Open("degrees are known within bounds alone")
-        return Proved(f"{len(tried)} levels", self._needed(tried))
+        return Proved(f"{self.count} levels", self._needed())
+
+    def _descend(
+        self, ceiling: _Ceiling
+    ) -> tuple[Answer | None, int | None, _Ceiling, bool]:
+        """Try levels below a ceiling; return a rival in the way, and where it was."""
+        is_open = False
+        for level, end in self._tried(ceiling):
+            self.count += 1
+            choice = self._choice(level, loose=True)
+            if choice is None:
+                continue
+            if self.base.is_coupled:
+                return Open("axes share inputs"), None, end, True
+            answer, rival = self._look(level, choice)
+            if answer is None and rival is None:
+                answer, rival = self._strictly(level)
+            if answer is not None or rival is not None:
+                return answer, rival, end, is_open
+            is_open = True
+        return None, None, ceiling, is_open
+
+    def _tried(self, ceiling: _Ceiling) -> Iterator[tuple[Fraction, _Ceiling]]:
+        """Yield levels that stand for all up to a ceiling, and how far each does."""
+        question, (top, is_closed) = self.question, ceiling
+        if question.level is not None:
+            yield question.level, ceiling
+            return
+        factors = [self.base.rules[i].factor for i in question.reach]
+        most = min(factors, default=ONE)
+        levels = self.view.levels
+        for low, high in zip(levels[-2::-1], levels[:0:-1], strict=True):
+            is_below = high < top or (is_closed and high == top)
+            if question.weak and high <= most and is_below:
+                yield high, (high, True)
+            if low < min(top, most):
+                end = min(high, top)
+                yield (low + end) / 2, (end, False)
 
     def _restricted(self) -> Question:
         asked, question = set(self.asked), self.question
@@ -214,26 +234,23 @@ class _Search:
             weak=tuple(i for i in question.weak if i in asked),
         )
 
-    def _choice(
-        self, level: Fraction, *, loose: bool
-    ) -> dict[str, tuple[Cell, int]] | None:
-        return self.levels.choice(self._restricted(), level, self.budget, loose=loose)
+    def _choice(self, level: Fraction, *, loose: bool) -> _Choice | None:
+        question = self._restricted()
+        return self.view.choice(question, level, self.budget, loose=loose)
 
     def _strictly(self, level: Fraction) -> tuple[Point | None, int | None]:
         """Look for a point at which it is so for certain."""
         if self.base.is_exact:
             return None, None
         choice = self._choice(level, loose=False)
-        return (
-            (None, None) if choice is None else self._look(level, choice, loose=False)
-        )
+        return (None, None) if choice is None else self._look(level, choice)
 
     def _look(
-        self, level: Fraction, choice: dict[str, tuple[Cell, int]], *, loose: bool
+        self, level: Fraction, choice: _Choice
     ) -> tuple[Point | None, int | None]:
         """Return a point if all holds there, or the strongest rival in the way."""
         question, base = self.question, self.base
-        point = self.levels.point(question, level, choice, loose=loose)
+        point = self.view.point(level, choice)
         if point is None or not base.contains(point):
             return None, None
         self.budget.spend(20 * len(question.rules))
@@ -248,18 +265,20 @@ class _Search:
         against += [i for i in question.weak if high[i] > top and i not in rest]
         return None, max(against, key=high.__getitem__, default=None)
 
-    def _needed(self, tried: Sequence[Fraction]) -> tuple[int, ...]:
+    def _needed(self) -> tuple[int, ...]:
         """Return the rivals without which it would not be proved, one by one."""
         if self.base.is_coupled and len(self.asked) > 8:
             return tuple(sorted(self.asked))
         for rival in [*self.asked] if len(self.asked) > 1 else ():
             self.asked.remove(rival)
-            if any(self._choice(level, loose=True) is not None for level in tried):
+            self.view = self._view()
+            levels = self._tried(_TOP)
+            if any(self._choice(level, loose=True) for level, _ in levels):
                 self.asked.append(rival)
         return tuple(sorted(self.asked))
 
 
-def _bits(places: Sequence[int]) -> int:
+def _bits(places: Iterable[int]) -> int:
     return sum(1 << place for place in set(places))
 
 

@@ -13,6 +13,9 @@ from fractions import Fraction
 from typing import Literal as Choice
 from typing import NamedTuple, NoReturn
 
+import msgspec
+from msgspec.structs import replace
+
 from fuzzytree.auditing.decide.answers import ONE
 from fuzzytree.auditing.engine.lines import Hedged
 from fuzzytree.model import (
@@ -43,7 +46,7 @@ MOST_QUESTIONS = 1_000
 Norm = Choice["minimum", "product"]
 
 
-class Literal(NamedTuple):
+class Literal(msgspec.Struct, frozen=True, cache_hash=True):
     """`variable is a or b`, perhaps negated, times a weight."""
 
     functions: tuple[MembershipFunction, ...]
@@ -203,7 +206,7 @@ def _of_system(system: FuzzySystem) -> ModelRules:
                     norm = "product"
                 weight = Fraction(rule.weight)
                 if norm == "minimum":
-                    way = tuple((axis, one._replace(scale=weight)) for axis, one in way)
+                    way = tuple((axis, replace(one, scale=weight)) for axis, one in way)
                 rules.append(BaseRule(way, norm, weight, then, number, own, pairs))
     return ModelRules(tuple(rules), tuple(silent), tuple(left_out))
 

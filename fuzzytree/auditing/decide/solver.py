@@ -19,10 +19,10 @@ from fuzzytree.auditing.decide.axes import Axis
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.engine.lines import Lines
 
-RESOURCES = 4_000_000
+RESOURCES = 1_000_000
 """What z3 may use for a question, in its own unit, which no clock changes."""
 
-_PER_STEP = 4  # about so many of its resources take as long as a step
+_PER_STEP = 1  # about so many of its resources take as long as a step
 
 
 def solver_for(base: Base) -> Solver | None:

@@ -120,9 +120,9 @@ def test_no_point_and_no_solver_disagree(
 def test_levels_alone_decide_lines() -> None:
     for seed in range(6):
         base = Base.of(*random_base(seed))
-        decider, solver = Decider(base), Solver(base, z3)
+        solver = Solver(base, z3)
         for question in questions(base, seed)[::3]:
-            answer = by_levels(decider.levels, question, Budget())
+            answer = by_levels(base, question, Budget())
             other = solver.ask(question, Budget())
             assert type(answer) is type(other), (seed, question, answer, other)
 
@@ -139,7 +139,7 @@ def test_a_step_beside_a_slope_lets_a_rule_win() -> None:
     )
     model = RuleBase("step", ("a", "b", "c"), (Variable("x0", terms),), rules)
     base = Base.of(model, Domain((DomainSide("x0", 0.0, 4.0),)))
-    answer = by_levels(Decider(base).levels, Question((0,), (1, 2, 4)), Budget())
+    answer = by_levels(base, Question((0,), (1, 2, 4)), Budget())
     assert isinstance(answer, Point)
     assert answer.values["x0"] <= Fraction(0.8)
 
