@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from fuzzytree.model import FloatArray, Use
+    from fuzzytree.rechecking import Report
     from fuzzytree.report import Picture
 
 
@@ -836,7 +837,7 @@ def recheck(
     model: str | os.PathLike[str],
     *,
     new: str | os.PathLike[str] | None = None,
-) -> auditing.Report:
+) -> Report:
     """Check the JSON file of an audit against the YAML file of its model, on its own.
 
     With `new`, it is the JSON file of a comparison of `model` with this other model.
@@ -846,10 +847,12 @@ def recheck(
     Raises:
         ReadError: If one of the files cannot be read.
     """
+    from fuzzytree.rechecking import CannotRunError, recheck_files
+
     try:
         paths = [audit, model] if new is None else [audit, model, new]
-        return auditing.recheck_files(*[os.fspath(one) for one in paths])
-    except auditing.CannotRunError as error:
+        return recheck_files(*[os.fspath(one) for one in paths])
+    except CannotRunError as error:
         raise ReadError(str(error)) from error
 
 

@@ -53,6 +53,3 @@ from .findings.subject import AuditRows as AuditRows
 from .findings.subject import AuditView as AuditView
 from .findings.subject import Material as Material
 from .findings.views import view as view
-from .recheck import recheck_files as recheck_files
-from .recheck.outcomes import CannotRunError as CannotRunError
-from .recheck.outcomes import Report as Report

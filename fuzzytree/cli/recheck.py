@@ -18,11 +18,11 @@ def command(audit: str, model: str, new: str | None) -> int:
     the JSON of `fuzzytree diff MODEL NEW`.
 
     Everything is read, evaluated and decided again by code that imports nothing else
-    of fuzzytree and runs alone; `python -m fuzzytree.auditing.recheck` is the same.
+    of fuzzytree and runs alone; `python -m fuzzytree.rechecking` is the same.
     Exit 1 if something does not hold.
     """
-    from fuzzytree.auditing import CannotRunError, recheck_files
     from fuzzytree.errors import ReadError
+    from fuzzytree.rechecking import CannotRunError, recheck_files
 
     try:
         report = recheck_files(audit, model, *([new] if new else []))

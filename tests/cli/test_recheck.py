@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.auditing.recheck.checks import LIMITS
+from fuzzytree.rechecking.checks import LIMITS
 from tests.auditing.diff.test_system_numbers import tipper
 
 CODES = ("--select", "FT1,FT301,FT404")
@@ -74,7 +74,7 @@ def test_a_file_that_is_not_there_is_one_sentence(call: Call) -> None:
 
 def test_the_module_is_the_same_program(call: Call, audit: dict[str, object]) -> None:
     ran = subprocess.run(
-        [sys.executable, "-m", "fuzzytree.auditing.recheck", "audit.json", "grip.yaml"],
+        [sys.executable, "-m", "fuzzytree.rechecking", "audit.json", "grip.yaml"],
         capture_output=True,
         text=True,
         check=False,

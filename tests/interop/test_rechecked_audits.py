@@ -12,11 +12,11 @@ from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import AuditSelection, AuditSettings
 from fuzzytree.auditing.findings.subject import Material
-from fuzzytree.auditing.recheck import recheck
-from fuzzytree.auditing.recheck.checks import digest_of
 from fuzzytree.checking.converting import load_content
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import yaml
+from fuzzytree.rechecking import recheck
+from fuzzytree.rechecking.checks import digest_of
 from tests.interop.audits import CORPORA, LEFT_OUT
 
 Need = Callable[[str], str]

@@ -25,7 +25,6 @@ from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.auditing.recheck import undecided_difference
 from fuzzytree.errors import ReadError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import (
@@ -39,6 +38,7 @@ from fuzzytree.model import (
     name_choice,
     version,
 )
+from fuzzytree.rechecking import undecided_difference
 from fuzzytree.semantics import as_rules, rules_from_tree
 
 

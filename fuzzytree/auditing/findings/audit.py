@@ -42,7 +42,6 @@ from fuzzytree.auditing.findings.records import (
 )
 from fuzzytree.auditing.findings.subject import AuditView, Material, Subject
 from fuzzytree.auditing.findings.views import view
-from fuzzytree.auditing.recheck import CannotRunError, undecided
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import (
@@ -53,6 +52,7 @@ from fuzzytree.model import (
     name_choice,
     version,
 )
+from fuzzytree.rechecking import CannotRunError, undecided
 
 FamilyFunction = Callable[[Subject], Iterator[AuditAnswer]]
 

@@ -21,8 +21,8 @@ from fuzzytree.auditing.findings.records import (
     Severity,
     TermName,
 )
-from fuzzytree.auditing.recheck.sentences import MESSAGES, names_in, sentence_of
 from fuzzytree.model import Value
+from fuzzytree.rechecking import MESSAGES, names_in, sentence_of
 
 
 class Code(Value, frozen=True):
@@ -80,7 +80,7 @@ def audit_answer(
     """Return an answer with the sentence of a message.
 
     Args:
-        message: Its name; see `fuzzytree.auditing.recheck.sentences`. It says of which
+        message: Its name; see `fuzzytree.rechecking.sentences`. It says of which
             code and severity the answer is, and whether it is a finding.
         subject: The subject of the question.
         state: How the answer is known; of messages `FTD` a `Declined` with the code.

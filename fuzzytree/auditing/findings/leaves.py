@@ -28,8 +28,8 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.recheck.sentences import open_interval
 from fuzzytree.model import FuzzyTree
+from fuzzytree.rechecking import open_interval
 
 MOST_BOXES = 20_000
 """Boxes of all leaves together, beyond which a tree's regions are not looked at."""

@@ -11,9 +11,10 @@ import msgspec
 
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Span, State
-from fuzzytree.auditing.recheck import checks
-from fuzzytree.auditing.recheck.checks import LIMITS as LIMITS
 from fuzzytree.model import Value, summary
+from fuzzytree.rechecking import LIMITS as LIMITS
+from fuzzytree.rechecking import digest_of as digest_of_facts
+from fuzzytree.rechecking import is_unconfirmed
 
 FORMAT: Final = "fuzzytree-audit/1"
 INTERRUPTED: Final = "interrupted"
@@ -81,7 +82,7 @@ class AuditAnswer(Value, frozen=True):
         id: Names the finding across releases: the code and a hash of what the rules
             and terms concerned say, whatever their order in the file is.
         message: What kind of sentence it is; see
-            `fuzzytree.auditing.recheck.sentences`.
+            `fuzzytree.rechecking.sentences`.
         facts: What the sentence says besides the subject, the measures, the region
             and the state.
     """
@@ -242,7 +243,7 @@ class Audit(Value, frozen=True):
     @property
     def unconfirmed(self) -> int:
         """How many findings could be PROVED, and were not decided again."""
-        return sum(map(checks.is_unconfirmed, self.open_findings))
+        return sum(map(is_unconfirmed, self.open_findings))
 
     def __repr__(self) -> str:
         """Show how many answers there are, and how many of them are findings."""
@@ -272,4 +273,4 @@ def digest_of(audit: Audit) -> str:
     empty digest: `json.dumps(facts, sort_keys=True, separators=(",", ":"),
     ensure_ascii=False)` of what the file holds, as UTF-8.
     """
-    return checks.digest_of(json.loads(msgspec.json.encode(audit)))
+    return digest_of_facts(json.loads(msgspec.json.encode(audit)))

@@ -29,11 +29,11 @@ from fuzzytree.auditing.findings.records import (
     digest_of,
 )
 from fuzzytree.auditing.findings.subject import AuditRows, Material
-from fuzzytree.auditing.recheck import recheck
 from fuzzytree.errors import TableError
 from fuzzytree.exporters import yaml
 from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import FuzzyTree, Leaf
+from fuzzytree.rechecking import recheck
 from fuzzytree.report import page, sarif_text
 from fuzzytree.semantics import rules_from_tree
 from fuzzytree.testing import random_system, random_tree

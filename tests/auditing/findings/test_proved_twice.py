@@ -13,14 +13,14 @@ from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import Audit, AuditSelection
 from fuzzytree.auditing.findings.subject import Material
-from fuzzytree.auditing.recheck import recheck
-from fuzzytree.auditing.recheck.case import Case
-from fuzzytree.auditing.recheck.deciding import PROOFS
-from fuzzytree.auditing.recheck.outcomes import DoesNotHoldError, UndecidedError
-from fuzzytree.auditing.recheck.records import Answer
 from fuzzytree.exporters import yaml
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Conjunction
+from fuzzytree.rechecking import recheck
+from fuzzytree.rechecking.case import Case
+from fuzzytree.rechecking.deciding import PROOFS
+from fuzzytree.rechecking.outcomes import DoesNotHoldError, UndecidedError
+from fuzzytree.rechecking.records import Answer
 from fuzzytree.report import audit_verdict
 from fuzzytree.testing import random_system
 from tests.auditing.diff.test_system_numbers import tipper
@@ -117,7 +117,7 @@ def test_how_much_is_decided_again_is_a_number_of_steps(
     model = random_base(1, 4, 2, "minimum", "points")
     spent = []
     for steps in (10**9, 20_000, 20_000):
-        monkeypatch.setattr("fuzzytree.auditing.recheck.STEPS_IN_ALL", steps)
+        monkeypatch.setattr("fuzzytree.rechecking.STEPS_IN_ALL", steps)
         proofs = [a for a in audited(model).answers if isinstance(a.state, Proved)]
         spent.append([a.id for a in proofs])
     assert len(spent[0]) > len(spent[1]) > 0

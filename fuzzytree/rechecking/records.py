@@ -13,12 +13,12 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
-from fuzzytree.auditing.recheck.outcomes import (
+from fuzzytree.rechecking.outcomes import (
     CannotRunError,
     DoesNotHoldError,
     require,
 )
-from fuzzytree.auditing.recheck.yaml import MOST_BYTES
+from fuzzytree.rechecking.yaml import MOST_BYTES
 
 
 class Coordinate(NamedTuple):

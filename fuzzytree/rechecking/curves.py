@@ -14,8 +14,8 @@ from collections.abc import Callable
 from decimal import Context, Decimal
 from fractions import Fraction
 
-from fuzzytree.auditing.recheck.models import ONE, ZERO, Curve
-from fuzzytree.auditing.recheck.outcomes import UndecidedError
+from fuzzytree.rechecking.models import ONE, ZERO, Curve
+from fuzzytree.rechecking.outcomes import UndecidedError
 
 Between = tuple[Fraction, Fraction]
 STRAIGHT = ("band", "points", "trapezoid")

@@ -10,21 +10,21 @@ from fractions import Fraction
 from statistics import NormalDist
 from typing import Any, Literal
 
-from fuzzytree.auditing.recheck.case import CLOSE, Case, class_at, strengths
-from fuzzytree.auditing.recheck.deciding import (
+from fuzzytree.rechecking.case import CLOSE, Case, class_at, strengths
+from fuzzytree.rechecking.deciding import (
     PROOFS,
     least_cover,
     top,
     ways_to,
     without,
 )
-from fuzzytree.auditing.recheck.models import ZERO
-from fuzzytree.auditing.recheck.outcomes import (
+from fuzzytree.rechecking.models import ZERO
+from fuzzytree.rechecking.outcomes import (
     Report,
     UndecidedError,
     require,
 )
-from fuzzytree.auditing.recheck.records import (
+from fuzzytree.rechecking.records import (
     Answer,
     Audit,
     Bracket,
@@ -38,7 +38,7 @@ from fuzzytree.auditing.recheck.records import (
     Witness,
     fraction,
 )
-from fuzzytree.auditing.recheck.sentences import MESSAGES, sentence_of
+from fuzzytree.rechecking.sentences import MESSAGES, sentence_of
 
 LIMITS = (
     "that the rules are right: an audit finds what a rule base says, not whether it is "

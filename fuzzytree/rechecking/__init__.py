@@ -1,7 +1,7 @@
 """Check an audit again without the engine that made it: `recheck AUDIT MODEL`.
 
-    python -m fuzzytree.auditing.recheck audit.json model.yaml
-    python -m fuzzytree.auditing.recheck diff.json old.yaml new.yaml
+    python -m fuzzytree.rechecking audit.json model.yaml
+    python -m fuzzytree.rechecking diff.json old.yaml new.yaml
 
 This folder needs Python 3.11 and nothing else, and imports nothing of the rest of
 fuzzytree: copy it, read it, run it alone (docs/how-to/recheck.md). It reads the audit
@@ -21,15 +21,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fuzzytree.auditing.recheck.case import Case
-from fuzzytree.auditing.recheck.checks import (
+from fuzzytree.rechecking.case import Case
+from fuzzytree.rechecking.checks import (
+    LIMITS,
     UNCHECKED,
     check_answer,
     check_files,
     check_head,
+    digest_of,
+    is_unconfirmed,
 )
-from fuzzytree.auditing.recheck.models import Model
-from fuzzytree.auditing.recheck.outcomes import (
+from fuzzytree.rechecking.models import Model
+from fuzzytree.rechecking.outcomes import (
     STEPS_IN_ALL,
     CannotRunError,
     DoesNotHoldError,
@@ -37,25 +40,38 @@ from fuzzytree.auditing.recheck.outcomes import (
     Report,
     UndecidedError,
 )
-from fuzzytree.auditing.recheck.records import (
+from fuzzytree.rechecking.records import (
     Audit,
     Declined,
     Proved,
     built,
     read_json,
 )
-from fuzzytree.auditing.recheck.two_models import (
+from fuzzytree.rechecking.sentences import (
+    MESSAGES,
+    names_in,
+    open_interval,
+    sentence_of,
+)
+from fuzzytree.rechecking.two_models import (
     recheck_difference,
     undecided_difference,
 )
-from fuzzytree.auditing.recheck.yaml import MOST_BYTES
+from fuzzytree.rechecking.yaml import MOST_BYTES
 
 __all__ = [
+    "LIMITS",
+    "MESSAGES",
     "CannotRunError",
     "Report",
+    "digest_of",
+    "is_unconfirmed",
+    "names_in",
+    "open_interval",
     "recheck",
     "recheck_difference",
     "recheck_files",
+    "sentence_of",
     "undecided",
     "undecided_difference",
 ]

@@ -9,17 +9,17 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.recheck import boxes
-from fuzzytree.auditing.recheck.case import STEPS, Case
-from fuzzytree.auditing.recheck.cells import (
+from fuzzytree.rechecking import boxes
+from fuzzytree.rechecking.case import STEPS, Case
+from fuzzytree.rechecking.cells import (
     Axis,
     Cell,
     Cells,
     Interval,
     numbers_in,
 )
-from fuzzytree.auditing.recheck.curves import bounds, is_straight, knots
-from fuzzytree.auditing.recheck.models import (
+from fuzzytree.rechecking.curves import bounds, is_straight, knots
+from fuzzytree.rechecking.models import (
     ONE,
     ZERO,
     Curve,
@@ -28,8 +28,8 @@ from fuzzytree.auditing.recheck.models import (
     Rules,
     Variable,
 )
-from fuzzytree.auditing.recheck.outcomes import UndecidedError, require
-from fuzzytree.auditing.recheck.records import Answer, fraction
+from fuzzytree.rechecking.outcomes import UndecidedError, require
+from fuzzytree.rechecking.records import Answer, fraction
 
 NEARLY = Fraction(1, 10**6)
 SHALLOW, TRACE = Fraction(1, 100), Fraction(1, 10**12)

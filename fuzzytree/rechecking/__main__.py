@@ -1,19 +1,19 @@
-"""`python -m fuzzytree.auditing.recheck AUDIT MODEL`: check, print, exit 0, 1 or 2."""
+"""`python -m fuzzytree.rechecking AUDIT MODEL`: check, print, exit 0, 1 or 2."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
 
-from fuzzytree.auditing.recheck import CannotRunError, recheck_files
+from fuzzytree.rechecking import CannotRunError, recheck_files
 
 
 def main(arguments: Sequence[str]) -> int:
     """Check the files that are named, and print the report."""
     if len(arguments) not in (2, 3):
         sys.stderr.write(
-            "usage: python -m fuzzytree.auditing.recheck AUDIT.json MODEL.yaml\n"
-            "       python -m fuzzytree.auditing.recheck DIFF.json OLD.yaml NEW.yaml\n"
+            "usage: python -m fuzzytree.rechecking AUDIT.json MODEL.yaml\n"
+            "       python -m fuzzytree.rechecking DIFF.json OLD.yaml NEW.yaml\n"
         )
         return 2
     try:

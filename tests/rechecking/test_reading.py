@@ -10,14 +10,14 @@ import pytest
 
 from fuzzytree.auditing.engine import states
 from fuzzytree.auditing.findings.records import LIMITS, Audit, AuditAnswer
-from fuzzytree.auditing.recheck import CannotRunError, checks, records
-from fuzzytree.auditing.recheck.case import strengths
-from fuzzytree.auditing.recheck.curves import bounds, is_straight, knots
-from fuzzytree.auditing.recheck.models import Model
-from fuzzytree.auditing.recheck.records import built, read_json
-from fuzzytree.auditing.recheck.yaml import read_yaml
 from fuzzytree.exporters import yaml
 from fuzzytree.numerics import decide
+from fuzzytree.rechecking import CannotRunError, checks, records
+from fuzzytree.rechecking.case import strengths
+from fuzzytree.rechecking.curves import bounds, is_straight, knots
+from fuzzytree.rechecking.models import Model
+from fuzzytree.rechecking.records import built, read_json
+from fuzzytree.rechecking.yaml import read_yaml
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.programs.operations import Doubles
 from fuzzytree.testing import random_system, random_tree

@@ -9,9 +9,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from fuzzytree.auditing import recheck as rechecking
-from fuzzytree.auditing.recheck import recheck_files
-from tests.auditing.recheck.audits import small
+from fuzzytree import rechecking as rechecking
+from fuzzytree.rechecking import recheck_files
+from tests.rechecking.audits import small
 
 FOLDER = Path(rechecking.__file__).parent
 
@@ -34,9 +34,9 @@ def alone(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """
     copy = folder / "alone"
     ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(FOLDER, copy / "fuzzytree/auditing/recheck", ignore=ignored)
+    shutil.copytree(FOLDER, copy / "fuzzytree/rechecking", ignore=ignored)
     return subprocess.run(
-        [sys.executable, "-E", "-S", "-m", "fuzzytree.auditing.recheck", *arguments],
+        [sys.executable, "-E", "-S", "-m", "fuzzytree.rechecking", *arguments],
         cwd=copy,
         capture_output=True,
         text=True,
@@ -50,9 +50,7 @@ def test_it_imports_nothing_but_itself_and_the_standard_library() -> None:
             others = {name.split(".")[0] for name in imported(path)}
             own = {name for name in imported(path) if name.startswith("fuzzytree")}
             assert others <= {*sys.stdlib_module_names, "fuzzytree"}, path
-            assert all(
-                f"{n}.".startswith("fuzzytree.auditing.recheck.") for n in own
-            ), path
+            assert all(f"{n}.".startswith("fuzzytree.rechecking.") for n in own), path
 
 
 def test_alone_in_an_empty_folder_it_checks_a_real_audit(tmp_path: Path) -> None:
@@ -77,7 +75,7 @@ def test_alone_it_reports_what_is_wrong(tmp_path: Path) -> None:
 def test_alone_it_prints_its_usage(tmp_path: Path) -> None:
     ran = alone(tmp_path, "audit.json")
     usage = (
-        "usage: python -m fuzzytree.auditing.recheck AUDIT.json MODEL.yaml\n"
-        "       python -m fuzzytree.auditing.recheck DIFF.json OLD.yaml NEW.yaml\n"
+        "usage: python -m fuzzytree.rechecking AUDIT.json MODEL.yaml\n"
+        "       python -m fuzzytree.rechecking DIFF.json OLD.yaml NEW.yaml\n"
     )
     assert (ran.returncode, ran.stdout, ran.stderr) == (2, "", usage)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.recheck.sentences import MESSAGES, rendered, shown
+from fuzzytree.rechecking.sentences import MESSAGES, rendered, shown
 
 
 def test_every_message_is_of_a_code_and_graded_as_its_code_can_be() -> None:

@@ -9,15 +9,15 @@ from fractions import Fraction
 from pathlib import PurePath
 from typing import Any, NamedTuple
 
-from fuzzytree.auditing.recheck.outcomes import CannotRunError, UndecidedError
-from fuzzytree.auditing.recheck.sentences_of_rules import (
+from fuzzytree.rechecking.outcomes import CannotRunError, UndecidedError
+from fuzzytree.rechecking.sentences_of_rules import (
     Condition,
     Is,
     Joint,
     read_conclusions,
     read_condition,
 )
-from fuzzytree.auditing.recheck.yaml import Items, read_yaml
+from fuzzytree.rechecking.yaml import Items, read_yaml
 
 ZERO, ONE = Fraction(0), Fraction(1)
 MOST_WAYS = 64

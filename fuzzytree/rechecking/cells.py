@@ -20,8 +20,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.auditing.recheck.curves import bounds, is_straight, knots
-from fuzzytree.auditing.recheck.models import (
+from fuzzytree.rechecking.curves import bounds, is_straight, knots
+from fuzzytree.rechecking.models import (
     ONE,
     ZERO,
     Curve,
@@ -29,7 +29,7 @@ from fuzzytree.auditing.recheck.models import (
     Rule,
     Variable,
 )
-from fuzzytree.auditing.recheck.outcomes import Limit
+from fuzzytree.rechecking.outcomes import Limit
 
 Interval = tuple[Fraction, Fraction]
 Needs = tuple[int, ...]

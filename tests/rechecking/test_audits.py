@@ -20,17 +20,17 @@ from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import AuditSelection
 from fuzzytree.auditing.findings.subject import AuditRows, Material
-from fuzzytree.auditing.recheck import CannotRunError, recheck
-from fuzzytree.auditing.recheck.checks import LIMITS, digest_of
 from fuzzytree.exporters import yaml
 from fuzzytree.model import FuzzySystem
 from fuzzytree.model.rulebase import Conjunction, RuleBase
 from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.rechecking import CannotRunError, recheck
+from fuzzytree.rechecking.checks import LIMITS, digest_of
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 from tests.auditing.engine.bases import Kind, random_base
 from tests.auditing.findings.test_mutations import PLANTED, ROWS, Planted
-from tests.auditing.recheck.audits import audited, small
+from tests.rechecking.audits import audited, small
 
 Facts = dict[str, Any]
 Way = tuple[str | int, ...]

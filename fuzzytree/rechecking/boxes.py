@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.auditing.recheck.cells import (
+from fuzzytree.rechecking.cells import (
     Axis,
     Cell,
     Cells,
@@ -22,8 +22,8 @@ from fuzzytree.auditing.recheck.cells import (
     Needs,
     numbers_in,
 )
-from fuzzytree.auditing.recheck.models import ONE, ZERO
-from fuzzytree.auditing.recheck.outcomes import UndecidedError
+from fuzzytree.rechecking.models import ONE, ZERO
+from fuzzytree.rechecking.outcomes import UndecidedError
 
 BOX = 500  # steps that a box takes
 HALF = Fraction(1, 2)

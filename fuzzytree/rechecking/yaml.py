@@ -6,7 +6,7 @@ import math
 import re
 from typing import Any, NamedTuple, NoReturn
 
-from fuzzytree.auditing.recheck.outcomes import CannotRunError
+from fuzzytree.rechecking.outcomes import CannotRunError
 
 MOST_BYTES = 64 * 2**20
 MOST_LEVELS = 32

@@ -15,14 +15,14 @@ from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference
 from fuzzytree.auditing.engine.states import Computed, Proved
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.recheck import CannotRunError, Report, recheck_difference
-from fuzzytree.auditing.recheck.__main__ import main
 from fuzzytree.exporters import yaml
 from fuzzytree.model import Document, FuzzySystem
 from fuzzytree.model.rulebase import Points, RuleBase
+from fuzzytree.rechecking import CannotRunError, Report, recheck_difference
+from fuzzytree.rechecking.__main__ import main
 from tests.auditing.engine.bases import random_base
 
-TIPPER = Path(__file__).parents[3] / "examples" / "tipper.fll"
+TIPPER = Path(__file__).parents[2] / "examples" / "tipper.fll"
 
 
 def base() -> RuleBase:

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property
 
-from fuzzytree.auditing.recheck import boxes
-from fuzzytree.auditing.recheck.cells import Cells, Interval
-from fuzzytree.auditing.recheck.curves import Between, bounds, is_straight
-from fuzzytree.auditing.recheck.models import (
+from fuzzytree.rechecking import boxes
+from fuzzytree.rechecking.cells import Cells, Interval
+from fuzzytree.rechecking.curves import Between, bounds, is_straight
+from fuzzytree.rechecking.models import (
     ONE,
     ZERO,
     Model,
@@ -21,14 +21,14 @@ from fuzzytree.auditing.recheck.models import (
     Rules,
     Variable,
 )
-from fuzzytree.auditing.recheck.outcomes import (
+from fuzzytree.rechecking.outcomes import (
     DoesNotHoldError,
     Limit,
     Report,
     UndecidedError,
     require,
 )
-from fuzzytree.auditing.recheck.records import (
+from fuzzytree.rechecking.records import (
     Answer,
     Audit,
     Claim,

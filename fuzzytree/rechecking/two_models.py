@@ -14,19 +14,19 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.recheck.case import Case, class_at, values_of
-from fuzzytree.auditing.recheck.cells import Interval
-from fuzzytree.auditing.recheck.checks import check_message, check_sample, check_source
-from fuzzytree.auditing.recheck.curves import bounds, is_straight, knots
-from fuzzytree.auditing.recheck.models import ONE, Curve, Facts, Model, Variable
-from fuzzytree.auditing.recheck.outcomes import (
+from fuzzytree.rechecking.case import Case, class_at, values_of
+from fuzzytree.rechecking.cells import Interval
+from fuzzytree.rechecking.checks import check_message, check_sample, check_source
+from fuzzytree.rechecking.curves import bounds, is_straight, knots
+from fuzzytree.rechecking.models import ONE, Curve, Facts, Model, Variable
+from fuzzytree.rechecking.outcomes import (
     STEPS_IN_ALL,
     Limit,
     Report,
     UndecidedError,
     require,
 )
-from fuzzytree.auditing.recheck.records import (
+from fuzzytree.rechecking.records import (
     Answer,
     Bracket,
     Computed,
