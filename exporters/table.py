@@ -30,6 +30,7 @@ TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "python": (".py",),
         "javascript": (".mjs", ".js"),
         "structured-text": (".st",),
+        "smt-lib": (".smt2",),
     }
 )
 """Each format's name and its suffixes, the usual one first.

@@ -837,21 +837,23 @@ def recheck(
     model: str | os.PathLike[str],
     *,
     new: str | os.PathLike[str] | None = None,
+    solver: str = "",
 ) -> Report:
     """Check the JSON file of an audit against the YAML file of its model, on its own.
 
     With `new`, it is the JSON file of a comparison of `model` with this other model.
+    `solver` is the program that decides what is PROVED; the package z3 by default.
 
     The report's `wrong` lists what does not hold; `lines()` is what the command prints.
 
     Raises:
-        ReadError: If one of the files cannot be read.
+        ReadError: If one of the files cannot be read, or the solver fails.
     """
     from fuzzytree.rechecking import CannotRunError, recheck_files
 
     try:
         paths = [audit, model] if new is None else [audit, model, new]
-        return recheck_files(*[os.fspath(one) for one in paths])
+        return recheck_files(*[os.fspath(one) for one in paths], solver=solver)
     except CannotRunError as error:
         raise ReadError(str(error)) from error
 

@@ -22,6 +22,7 @@ from .engine.states import counted as counted
 from .engine.states import number_text as number_text
 from .engine.states import point_of as point_of
 from .findings.audit import audit as audit
+from .findings.audit import smt_text as smt_text
 from .findings.audit import source_of as source_of
 from .findings.baselines import baseline_of as baseline_of
 from .findings.baselines import read_baseline as read_baseline

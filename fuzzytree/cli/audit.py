@@ -123,6 +123,9 @@ class AuditOptions(TableOptions, FullResultOptions):
     page: str | None = output_option(
         "--page FILE", "HTML file to write the audit to, in addition."
     )
+    smt: str | None = output_option(
+        "--smt FILE", "SMT-LIB 2 file to write all that is PROVED to, for any solver."
+    )
     results: tuple[str, ...] = several(
         "--results FILE",
         "Result of `check --json` or `stability --json` to include (repeat).",
@@ -153,6 +156,7 @@ def command(options: AuditOptions) -> int:
         baseline_of,
         read_baseline,
         resolved_ids,
+        smt_text,
     )
     from fuzzytree.report import audit_lines, audit_verdict
 
@@ -161,7 +165,7 @@ def command(options: AuditOptions) -> int:
             "--target names a column of a table; give it with --data"
         )
     output = None if options.output == "-" else options.output
-    if "-" in (options.page, options.write_baseline):
+    if "-" in (options.page, options.write_baseline, options.smt):
         raise click.UsageError("`-` is stdout, where the findings go; name a file")
     known = configured(options.config, quiet=options.quiet)
     path = options.baseline or known.baseline
@@ -216,6 +220,9 @@ def command(options: AuditOptions) -> int:
         if options.page is not None:
             _write_page(found, material, options.page)
             wrote.append(options.page)
+        if options.smt is not None:
+            write_atomically(options.smt, smt_text(found, material.model).encode())
+            wrote.append(options.smt)
         if options.write_baseline is not None:
             write_atomically(options.write_baseline, baseline_of(found))
             said = f"{len(found.findings)} accepted with --baseline"

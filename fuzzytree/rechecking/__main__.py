@@ -10,19 +10,23 @@ from fuzzytree.rechecking import CannotRunError, recheck_files
 
 def main(arguments: Sequence[str]) -> int:
     """Check the files that are named, and print the report."""
-    if len(arguments) not in (2, 3):
+    names, solver = [*arguments], ""
+    if names[:1] == ["--solver"]:
+        names, solver = names[2:], "".join(names[1:2])
+    if len(names) not in (2, 3):
+        start = "python -m fuzzytree.rechecking [--solver PROGRAM]"
         sys.stderr.write(
-            "usage: python -m fuzzytree.rechecking AUDIT.json MODEL.yaml\n"
-            "       python -m fuzzytree.rechecking DIFF.json OLD.yaml NEW.yaml\n"
+            f"usage: {start} AUDIT.json MODEL.yaml\n"
+            f"       {start} DIFF.json OLD.yaml NEW.yaml\n"
         )
         return 2
     try:
-        report = recheck_files(*arguments)
+        report = recheck_files(*names, solver=solver)
     except CannotRunError as error:
         sys.stderr.write(f"{error}\n")
         return 2
     sys.stdout.write("\n".join(report.lines()) + "\n")
-    return 1 if report.wrong else 0
+    return report.exit_code
 
 
 if __name__ == "__main__":

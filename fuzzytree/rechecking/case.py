@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property
 
-from fuzzytree.rechecking import boxes
-from fuzzytree.rechecking.cells import Cells, Interval
-from fuzzytree.rechecking.curves import Between, bounds, is_straight
+from fuzzytree.rechecking.curves import Between, bounds, is_straight, knots
 from fuzzytree.rechecking.models import (
     ONE,
     ZERO,
@@ -23,7 +21,6 @@ from fuzzytree.rechecking.models import (
 )
 from fuzzytree.rechecking.outcomes import (
     DoesNotHoldError,
-    Limit,
     Report,
     UndecidedError,
     require,
@@ -38,10 +35,9 @@ from fuzzytree.rechecking.records import (
     Witness,
     fraction,
 )
+from fuzzytree.rechecking.smt import Script
 
-STEPS = (8, 32)
-"""Into so many steps from 0 to 1 a curve that is no line is cut, coarsely first."""
-MOST_POINTS = 200
+MOST_POINTS = 40
 CLOSE = Fraction(1, 2**70)
 """How far beside a point curves that are no lines are evaluated, where many are."""
 
@@ -53,41 +49,48 @@ class Case:
         sides: The sides of the domain by name.
         is_free: Whether no variable is a combination of others.
         numbers: The numbers of the rules, from 1.
-        limit: How much work an answer may take.
-        more: Rules that are none of the model's; their numbers come after these.
     """
 
-    def __init__(self, facts: Audit | Difference, model: Model, limit: Limit) -> None:
-        self.model, self.rules, self.limit = model, model.rules, limit
+    def __init__(self, facts: Audit | Difference, model: Model) -> None:
+        self.model, self.rules = model, model.rules
         self.settings, self.answers = facts.settings, facts.answers
         self.file = facts.file if isinstance(facts, Audit) else None
         sides = {side.variable: side for side in facts.domain.sides}
         self.sides = {n: side for n, side in sides.items() if n in model.variables}
         self.is_free = not any(v.parts for v in model.variables.values())
         self.numbers = range(1, len(self.rules.rules) + 1)
-        self.more: list[Rule] = []
         self._strengths: dict[tuple[object, ...], list[Between]] = {}
-        self._cells: dict[int, Cells | UndecidedError] = {}
 
-    def ends(self, variable: Variable) -> Interval:
-        """Return the values of a variable in the domain; of a combination, at most."""
+    @cached_property
+    def script(self) -> Script:
+        """The model as text for a solver."""
+        ends = {n: (Fraction(s.low), Fraction(s.high)) for n, s in self.sides.items()}
+        values = {name: side.points for name, side in self.sides.items()}
+        script = Script()
+        script.add(self.model, ends, values=values)
+        return script
+
+    def symbol(self, number: int) -> str:
+        """Return the strength of a rule, in the text for a solver."""
+        return self.script.symbol(self.name(number))
+
+    def ends(self, variable: Variable) -> tuple[Fraction, Fraction]:
+        """Return the values of a variable in the domain; of a sum, at most."""
         side = self.sides.get(variable.name)
-        if not variable.parts:
-            require(side is not None, f"the domain has no side {variable.name!r}")
-            assert side is not None
-            stand_in = side.low if side.missing is None else side.missing
-            ends = side.low, side.high, stand_in
-            return Fraction(min(ends)), Fraction(max(ends))
-        weights = dict.fromkeys((name for name, *_ in variable.parts), ZERO)
-        low = high = -sum((w * c for _, w, c in variable.parts), start=ZERO)
-        for name, weight, _ in variable.parts:  # an input may stand several times
-            weights[name] += weight
-        for name, weight in weights.items():
-            both = [weight * end for end in self.ends(self.model.variables[name])]
-            low, high = low + min(both), high + max(both)
-        if side is not None:
-            low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))
-        return low, high
+        if variable.parts:
+            low = high = ZERO
+            for name, weight, centre in variable.parts:
+                every = self.ends(self.model.variables[name])
+                ends = sorted(weight * (end - centre) for end in every)
+                low, high = low + ends[0], high + ends[1]
+            if side is None:
+                return low, high
+            return max(low, Fraction(side.low)), min(high, Fraction(side.high))
+        require(side is not None, f"the domain has no side {variable.name!r}")
+        assert side is not None
+        stand_in = side.low if side.missing is None else side.missing
+        every = side.low, side.high, stand_in
+        return Fraction(min(every)), Fraction(max(every))
 
     def then(self, number: int) -> str:
         """Return the class of a rule."""
@@ -119,141 +122,59 @@ class Case:
         """Return the answers whose message begins so."""
         return [one for one in self.answers if one.message.startswith(start)]
 
-    # --- what can be
-
-    def cells(self, step: int) -> Cells:
-        """Return the rules in cells; behind them those of `more`.
-
-        Raises:
-            UndecidedError: If there are too many.
-        """
-        if step not in self._cells:
-            rules = self.rules.rules
-            has_twice = any(len({*rule.when}) < len(rule.when) for rule in rules)
-            if self.rules.is_product and has_twice:
-                raise UndecidedError("a product in which one degree stands twice")
-            settings = self.settings
-            levels = {Fraction(settings.epsilon), Fraction(settings.level)}
-            for one in self.answers:
-                levels.update(
-                    Fraction(m.value)
-                    for m in one.measures
-                    if one.code == "FT301" and 0 <= m.value <= 1
-                )
-            ends = {v.name: self.ends(v) for v in self.rules.variables.values()}
-            try:
-                self._cells[step] = Cells(
-                    rules, self.rules.variables, ends, levels, step, self.limit
-                )
-            except UndecidedError as error:  # known once, for every question
-                self._cells[step] = error
-        result = self._cells[step]
-        if isinstance(result, UndecidedError):
-            raise result
-        of = result.of
-        of += [
-            result.needs(one.when) for one in self.more[len(of) - len(self.numbers) :]
-        ]
-        return result
-
-    def number_of(self, rule: Rule) -> int:
-        """Return a number for a rule of the model that lacks a proposition."""
-        self.more.append(rule)
-        return len(self.numbers) + len(self.more)
-
-    def refined(
-        self, question: Callable[[Cells], bool], *, is_sure: bool = False
-    ) -> bool:
-        """Return whether something can be, for certain.
-
-        Raises:
-            UndecidedError: If it is not known; with finer steps it might be.
-        """
-        for step in STEPS:
-            cells = self.cells(step)
-            if not question(cells):
-                return False
-            if cells.is_exact or is_sure:
-                break
-        else:
-            raise UndecidedError("curves that are no lines, and too near to each other")
-        if not self.is_free:
-            raise UndecidedError("variables share inputs, which needs more than cells")
-        return True
-
-    def may(self, question: Callable[[], bool]) -> bool:
-        """Return whether something can be, or is not known not to be."""
-        try:
-            return question()
-        except UndecidedError:
-            return True
-
-    def beats(
-        self,
-        mine: Sequence[int],
-        rivals: Iterable[int],
-        low: Fraction = ZERO,
-        high: Fraction = ONE,
-    ) -> bool:
-        """Return whether some rules reach a level together that no rival does."""
-        others = [*rivals]
-
-        def question(cells: Cells) -> bool:
-            ours = [cells.of[n - 1] for n in mine]
-            if self.rules.is_product:
-                return boxes.exists(
-                    cells, ours, [cells.of[n - 1] for n in others], low, high
-                )
-            return cells.exists(ours, sum(1 << (n - 1) for n in others), low, high)
-
-        is_plain = len(mine) == 1 and len(others) < 2 and not low
-        if is_plain and mine[0] in self.above[others[0] if others else 0]:
-            return True
-        return self.refined(question, is_sure=self.rules.is_product)
-
-    def tie(self, one: int, other: int, rivals: Iterable[int]) -> bool:
-        """Return whether two rules tie on an open set, no rival above them."""
-        others = [n for n in rivals if n not in (one, other)]
-
-        def question(cells: Cells) -> bool:
-            if self.rules.is_product:
-                return boxes.tie(cells, one - 1, other - 1, [n - 1 for n in others])
-            return cells.tie(
-                one - 1, other - 1, rivals=sum(1 << (n - 1) for n in others)
-            )
-
-        return self.refined(question, is_sure=self.rules.is_product)
+    # --- points that are known
 
     @cached_property
-    def known(self) -> list[list[Between]]:
-        """The strengths of all rules at witnesses and other points of the domain."""
+    def known(self) -> list[tuple[Point, list[Between]]]:
+        """Witnesses and other points of the domain, with the strengths of all rules."""
         points = [
             {c.input: fraction(c.exact) for c in one.state.point}
             for one in self.answers
             if isinstance(one.state, Witness)
         ]
-        points = [p for p in points if p.keys() == {*self.inputs} and self.is_within(p)]
+        points = [p for p in points if p.keys() == {*self.inputs}]
+        points += [self.best(n) for n in self.numbers]
         chance = random.Random(0)
         for _ in range(MOST_POINTS):
             point = {}
             for name in self.inputs:
                 low, high = self.ends(self.model.variables[name])
-                point[name] = low + (high - low) * Fraction(
-                    chance.randrange(1025), 1024
-                )
-            points += [point] if self.is_within(point) else []
-        result: list[list[Between]] = []
-        for point in points:
-            self.limit.spend(len(self.rules.rules))
-            result.append(strengths(self.rules, point, CLOSE))
+                share = Fraction(chance.randrange(1025), 1024)
+                point[name] = low + (high - low) * share
+            points.append(point)
+        points = [dict(p) for p in dict.fromkeys(tuple(one.items()) for one in points)]
+        return [(p, strengths(self.rules, p)) for p in points if self.is_within(p)]
+
+    @cached_property
+    def _values(self) -> dict[str, list[Fraction]]:
+        """The values of each input at which its curves change, and between these."""
+        result: dict[str, list[Fraction]] = {}
+        for name in self.inputs:
+            low, high = self.ends(self.model.variables[name])
+            curves = self.rules.variables[name].curves.values()
+            inner = {x for one in curves for x in knots(one) if low < x < high}
+            ends = sorted({low, high, *inner})
+            ends += [(a + b) / 2 for a, b in itertools.pairwise(ends)]
+            result[name] = ends
         return result
+
+    def best(self, *numbers: int) -> dict[str, Fraction]:
+        """Return a point at which rules are strong together, axis by axis."""
+        when = [one for n in numbers for one in self.rules.rules[n - 1].when]
+        point = {}
+        for name, values in self._values.items():
+            own = [one for one in when if one.variable == name]
+            part = self.rules._replace(rules=(Rule(tuple(own), ""),))
+            only = part._replace(variables={name: self.rules.variables[name]})
+            least = [strengths(only, {name: x})[0][0] for x in values] if own else [ONE]
+            point[name] = values[least.index(max(least))]
+        return point
 
     @cached_property
     def above(self) -> dict[int, set[int]]:
         """For each rule those known to be above it somewhere; for 0 those that fire."""
         result: dict[int, set[int]] = {n: set() for n in (0, *self.numbers)}
-        for one in self.known:
-            self.limit.spend(len(one) ** 2)
+        for _, one in self.known:
             for n, (_, most) in enumerate([(ZERO, ZERO), *one]):
                 result[n] |= {m for m in self.numbers if one[m - 1][0] > most}
         return result

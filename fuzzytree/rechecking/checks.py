@@ -5,17 +5,19 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from statistics import NormalDist
 from typing import Any, Literal
 
 from fuzzytree.rechecking.case import CLOSE, Case, class_at, strengths
-from fuzzytree.rechecking.deciding import (
-    PROOFS,
-    least_cover,
-    top,
-    ways_to,
+from fuzzytree.rechecking.claims import (
+    PROVABLE,
+    Statement,
+    bound_statements,
+    conflicting_pairs,
+    no_more_gaps,
+    statements,
     without,
 )
 from fuzzytree.rechecking.models import ZERO
@@ -70,7 +72,8 @@ NOT_ASKED = ("FT801", "FT802", "FT901")
 
 UNCHECKED = (
     "the version, the hash of the model's content, the table, how many rows and how "
-    "long, how proofs were made, why something is open or left out, ids, the commands"
+    "long, how proofs were made, who confirmed them, why something is open or left "
+    "out, ids, the commands"
 )
 """What of an audit is read and compared with nothing."""
 
@@ -80,6 +83,10 @@ def digest_of(facts: Mapping[str, Any]) -> str:
     whole = dict(facts) | {"digest": ""}
     text = json.dumps(whole, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+CLOSE_LEVEL = Fraction(1, 10**9)
+"""How far a level of a witness may be rounded."""
 
 
 # --- the audit as a whole
@@ -142,7 +149,7 @@ def _domain(audit: Audit, case: Case, report: Report) -> None:
         text = f"the side of {name!r}"
         expect(side.low <= side.high, f"{text} has swapped ends")
         one = variables.get(name)
-        codes = () if one is None else one.codes
+        codes = () if one is None else tuple(map(float, range(len(one.categories))))
         is_part = {*side.values} <= {*codes} and bool(side.values) == bool(codes)
         ends = (side.values[0], side.values[-1]) if side.values else None
         is_part &= ends in (None, (side.low, side.high))
@@ -229,25 +236,62 @@ def _questions(audit: Audit, case: Case, report: Report) -> None:
     )
     is_all = "FT107" in left or not of or count == sum(lengths)
     expect(is_all, "FT107 has not one answer for each proposition")
+    report.wrong += _closings(audit, case)
+
+
+def _closings(audit: Audit, case: Case) -> Iterator[str]:
+    """Yield which codes lack the answer that is about all that is not listed."""
+    left = [text.split(" ")[0] for text in audit.unasked]
+    pairs, fires = conflicting_pairs(case), case.above[0]
+    alike, apart = (case.pairs(alike=is_alike) for is_alike in (True, False))
+    needed = {
+        "FT104": [pair for pair in alike if {*pair} <= fires],
+        "FT105": [pair for pair in apart if {*pair} <= fires],
+        "FT106": case.pairs(),
+        "FT201": pairs - {one.rules for one in case.coded("FT201.")},
+        "FT202": apart,
+    }
+    if case.model.form == "system":
+        del needed["FT105"], needed["FT202"]
+    for code, rest in needed.items():
+        of = case.coded(f"{code}.")
+        is_closed = any(not one.rules for one in of) or not (rest and of)
+        if not is_closed and code not in left:
+            yield f"{code} says nothing of all that it does not list"
+    known = [one.message for one in case.coded("FT301.")]
+    if known == ["FT301.fires"] and "FT301" not in left:
+        yield "FT301 says nothing of how strong the strongest rule is"
+
+
+def check_gaps(audit: Audit, case: Case) -> tuple[Answer, list[Statement]] | None:
+    """Return the claim that there are no more gaps than the listed ones."""
+    gaps = case.coded("FT301.gap")
+    is_open = any(text.startswith("FT301 ") for text in audit.unasked)
+    is_open |= bool(case.coded("FT301.more"))
+    if not gaps or is_open or any(not one.region for one in gaps):
+        return None
+    return gaps[-1], [no_more_gaps(case, gaps)]
 
 
 # --- one answer
 
 
-def check_answer(case: Case, report: Report, answer: Answer, number: int) -> None:
-    """Check everything about an answer."""
-    with report.answer(number, answer, case.limit):
+def check_answer(
+    case: Case, report: Report, answer: Answer, number: int
+) -> list[Statement]:
+    """Check everything about an answer, and return what a solver must decide."""
+    with report.answer(number, answer):
         check_message(answer)
         _words(case, answer)
         report.counts["sentences written again"] += 1
         _names(case, report, answer)
         check_spans(case, answer.region)
-        _state(case, report, answer)
-
-
-def is_unconfirmed(answer: Any) -> bool:
-    """Return whether an answer that can be PROVED is COMPUTED, of whichever program."""
-    return type(answer.state).__name__ == "Computed" and answer.message in PROOFS
+        result = _state(case, report, answer)
+        if isinstance(answer.state, Proved) and not result:
+            report.counts["answers PROVED, read and evaluated again"] += 1
+            report.confirmed[number - 1] = "recheck"
+        return result
+    return []
 
 
 def check_message(answer: Answer) -> None:
@@ -258,8 +302,6 @@ def check_message(answer: Answer) -> None:
         code = answer.state.code if isinstance(answer.state, Declined) else ""
     require(answer.code == code, "its message is of another code")
     is_note = grade == "note" or (grade.endswith("?") and not answer.is_finding)
-    if grade == "error" and is_unconfirmed(answer):
-        grade = "warning"
     wanted = (not is_note, "info" if is_note else grade.rstrip("?"))
     require(
         (answer.is_finding, answer.severity) == wanted, f"it is a finding of {grade}"
@@ -393,50 +435,65 @@ def _names(case: Case, report: Report, answer: Answer) -> None:
     require(is_file, "a place that is not in the audited file")
 
 
-def _state(case: Case, report: Report, answer: Answer) -> None:
+def _state(case: Case, report: Report, answer: Answer) -> list[Statement]:
+    """Check a state, and return what a solver must decide."""
     state = answer.state
     name, kind = answer.message, type(state).__name__.upper()
-    if isinstance(state, Proved | Computed):
+    if isinstance(state, Proved):
         require(bool(state.how), f"it is {kind}, without how")
-        try:
-            if name not in PROOFS:
-                raise UndecidedError("there is no second way for it here")
-            PROOFS[name](case, answer)
-        except UndecidedError:
-            if isinstance(state, Proved):
-                raise
-            report.counts["answers COMPUTED, not decided again"] += 1
-            return
-        report.counts[f"answers {kind}, decided again"] += 1
-        return
+        return statements(case, answer)
+    if isinstance(state, Computed):
+        require(bool(state.how), f"it is {kind}, without how")
+        report.counts["answers COMPUTED, not decided again"] += 1
+        return []
     if isinstance(state, Declined):
         known = {f"FTD0{n}" for n in range(1, 9)}
         is_reason = state.code in known and bool(state.reason)
         require(is_reason, "declined, and not for a reason")
         require(not answer.is_finding, "what is declined is no finding")
         report.counts["answers DECLINED"] += 1
-        return
-    is_free = name not in PROOFS or name in (
-        "FT202.others",
-        "FT203.leaves",
-        "FT104.others",
-        "FT105.others",
-        "FT106.others",
-    )
+        return []
+    is_free = name not in PROVABLE or name.endswith((".others", ".leaves"))
     is_free |= isinstance(state, Bracket) and answer.code == "FT403"
     require(is_free, f"it must be PROVED, and is {kind}")
     if isinstance(state, Witness):
         _witness(case, report, answer, state)
         report.counts["answers with a WITNESS, evaluated again"] += 1
-    elif isinstance(state, Bracket):
+        return bound_statements(case, answer)
+    if isinstance(state, Bracket):
         require(name not in SHOWS, "it needs a witness")
         require(state.low <= state.high, "the ends of the bracket are swapped")
         if state.point or state.claims:
             case.check_point(report, state.point, state.claims)
-        raise UndecidedError("a bracket is not computed again here")
-    else:
-        check_sample(state)
-        raise UndecidedError("a sample is not drawn again here")
+        result = bound_statements(case, answer)
+        if not result:
+            raise UndecidedError("a bracket is not computed again here")
+        return result
+    check_sample(state)
+    raise UndecidedError("a sample is not drawn again here")
+
+
+def judge(results: Iterable[tuple[Statement, str]], *, is_exact: bool) -> None:
+    """Compare what a solver answers with what proves each claim.
+
+    Raises:
+        DoesNotHoldError: If it refutes one.
+        UndecidedError: If it leaves one open, or refutes only bounds of it.
+    """
+    why = ""
+    for one, result in results:
+        is_sure = result == "unsat" or (result == "sat" and is_exact)
+        if is_sure and result == one.expected:
+            continue
+        require(not (is_sure and one.is_sure), f"not so: {one.text}")
+        text = "it may be so only where strengths are equal"
+        if result == "unknown":
+            text = "beyond the budget of the solver"
+        elif not is_sure:
+            text = "curves that are no lines, and too near to each other"
+        why = why or text
+    if why:
+        raise UndecidedError(why)
 
 
 def check_sample(state: Sampled) -> None:
@@ -552,10 +609,12 @@ def _shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
     is_high = any(fraction(claim.level) >= level for claim in met)
     require(is_high, "it is not claimed that both reach the level")
     require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
-    require(
-        answer.facts["level"] == answer.measures[0].value, "the level is another one"
-    )
-    top(case, answer)
+    low = answer.measures[0].value
+    require(answer.facts["level"] == low, "the level is another one")
+    every = strengths(case.rules, case.point_of(state.point))
+    reached = min(every[n - 1][1] for n in answer.rules)
+    off = Fraction(answer.facts.get("falls short", 0)) + CLOSE_LEVEL
+    require(reached >= Fraction(low) - off, "less is reached there")
 
 
 def _shows_difference(case: Case, answer: Answer, state: Witness) -> None:
@@ -570,25 +629,22 @@ def _shows_difference(case: Case, answer: Answer, state: Witness) -> None:
 
 
 def _shows_region(case: Case, answer: Answer, state: Witness) -> None:
-    """Compare the region of a leaf with the intervals on the path to it."""
+    """Check that a leaf's witness reaches it, and that its region is of its path."""
     (number,) = answer.rules
     is_there = case.model.leaf_at(case.point_of(state.point)) == number
     require(is_there, "the witness reaches another leaf")
-    require(
-        [c.label for c in state.claims] == [case.model.leaves[number - 1]],
-        "it is not the leaf's class",
-    )
-    used = {node["ask"] for node, _ in case.model.paths[number - 1]}
-    require({s.variable for s in state.region} == used, "not the variables of its path")
+    label = case.model.leaves[number - 1]
+    require([c.label for c in state.claims] == [label], "it is not the leaf's class")
+    ends: dict[str, set[float]] = {}
+    for node, _ in case.model.paths[number - 1]:
+        ends.setdefault(node["ask"], set()).update(node["cuts"])
+    is_path = {span.variable for span in state.region} == ends.keys()
+    require(is_path, "not the variables of its path")
     for span in state.region:
-        is_one = any(
-            math.isclose(span.low or 0.0, low, rel_tol=2.0**-50)
-            and math.isclose(span.high or 0.0, high, rel_tol=2.0**-50)
-            for low, high, _ in ways_to(
-                case, number, case.model.variables[span.variable]
-            )
-        )
-        require(is_one, f"the path leads elsewhere in {span.variable!r}")
+        side = case.sides.get(span.variable)
+        known = ends[span.variable] | ({side.low, side.high} if side else set())
+        is_end = {span.low, span.high} <= known or side is None
+        require(is_end, f"the path leads elsewhere in {span.variable!r}")
 
 
 def _shows_gap(case: Case, answer: Answer, state: Witness) -> None:
@@ -599,8 +655,6 @@ def _shows_gap(case: Case, answer: Answer, state: Witness) -> None:
     met = [c for c in below if {*c.rules} == {*case.numbers}]
     is_low = any(fraction(claim.level) <= level for claim in met)
     require(is_low, "it is not claimed that all rules are below")
-    if is_weak:
-        least_cover(case, answer)
 
 
 SHOWS: dict[str, Callable[[Case, Answer, Witness], None]] = {

@@ -66,8 +66,8 @@ class Variable(NamedTuple):
     high: float | None
     parts: tuple[tuple[str, Fraction, Fraction], ...]
     is_clipped: bool = False
-    codes: tuple[float, ...] = ()
-    missing: float | None = None
+    categories: tuple[str, ...] = ()
+    missing: Fraction | None = None
 
     def at(self, point: Point) -> Fraction:
         """Return its value at a point."""
@@ -103,6 +103,7 @@ class Model:
         numbers: The number in the file of each rule, from 1.
         silent: The names of rules of a system that never fire, as their text says.
         absent: The numbers in the file of rules that are not audited, by name.
+        reasons: Why rules of a system are left out, by name.
         labels: Every term of an input, by its variable.
         asked: The variables and terms that the file's rules use.
         places: The lines and columns of rules and terms in the file.
@@ -144,7 +145,7 @@ class Model:
         self.paths: list[Steps] = []
         self.silent: list[str] = []
         self.absent: dict[str, int] = {}
-        self.is_whole = True
+        self.is_whole, self.reasons = True, dict[str, str]()
         self.places: list[Place] = [*_places(top.get("rules", top.get("leaves")))]
         for block in top.get("blocks", []):
             self.places += _places(block["rules"])
@@ -302,9 +303,10 @@ class Model:
             )
             try:
                 ways = self.ways(condition, block) if weight else []
-            except UndecidedError:
+            except UndecidedError as error:
                 ways = []
                 self.is_whole = False
+                self.reasons[name] = str(error)
                 left_out.add(name)
             if name in left_out:
                 self.is_whole = False
@@ -368,7 +370,8 @@ class Model:
                 return [(one,)]
             is_fit = block.get("or") == "maximum" and not (negated and self.is_product)
         if not is_fit:
-            raise UndecidedError("a condition that does not hold by its ways")
+            norms = f"AND is {block.get('and')} and OR is {block.get('or')}"
+            raise UndecidedError(f"not a minimum, product or maximum: {norms}")
         is_union = (word == "or") is not negated
         result: list[tuple[Proposition, ...]] = [] if is_union else [()]
         for part in inner:
@@ -547,12 +550,10 @@ def _variable(one: Facts) -> Variable:
     ]
     curves = _curves(one.get("terms", []))
     unit, is_clipped = one.get("unit", ""), "outside" in ends
-    codes = tuple(map(float, range(len(one.get("categories", [])))))
-    missing = one.get("missing as")
-    stand_in = None if missing is None else number_of(missing)
-    parts = tuple(inputs)
+    missing = Fraction(number_of(one["missing as"])) if "missing as" in one else None
+    names = tuple(one.get("categories", ()))
     return Variable(
-        one["name"], curves, unit, low, high, parts, is_clipped, codes, stand_in
+        one["name"], curves, unit, low, high, tuple(inputs), is_clipped, names, missing
     )
 
 

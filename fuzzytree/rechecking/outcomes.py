@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter, defaultdict
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -31,39 +30,6 @@ def require(is_so: bool, otherwise: str) -> None:
         raise DoesNotHoldError(otherwise)
 
 
-MOST_STEPS = 2_000_000
-STEPS_IN_ALL = 2 * MOST_STEPS
-"""For an answer, and for all answers of an audit that is not yet done."""
-
-
-class Limit:
-    """How much work an answer may take, and all of them.
-
-    Attributes:
-        left: The steps that are left for an answer.
-        whole: Those left for all answers.
-        is_late: Whether nothing more shall be begun.
-    """
-
-    def __init__(
-        self, whole: float = math.inf, is_late: Callable[[], bool] = lambda: False
-    ) -> None:
-        self.left, self.whole, self.is_late = MOST_STEPS, whole, is_late
-
-    def spend(self, steps: int) -> None:
-        """Count some steps.
-
-        Raises:
-            UndecidedError: If there are too many, or nothing more shall be begun.
-        """
-        self.left -= steps
-        self.whole -= steps
-        if self.left < 0:
-            raise UndecidedError(f"more than {MOST_STEPS:,} steps")
-        if self.whole < 0 or self.is_late():
-            raise UndecidedError("the budget is spent")
-
-
 class Report:
     """The results of a re-check.
 
@@ -73,6 +39,8 @@ class Report:
         counts: How often each kind of check was made.
         undecided: The positions of the answers not decided again, by state and reason.
         codes: The code of each answer.
+        confirmed: By position what confirms each answer: a solver, or `recheck`.
+        unconfirmed: How many answers PROVED only a solver can confirm, without one.
     """
 
     def __init__(self, unchecked: str = "") -> None:
@@ -81,22 +49,23 @@ class Report:
         self.counts = Counter[str]()
         self.undecided = defaultdict[tuple[str, str], list[int]](list)
         self.codes: list[str] = []
+        self.confirmed: dict[int, str] = {}
+        self.unconfirmed = 0
+
+    @property
+    def exit_code(self) -> int:
+        """1 if something is wrong; 2 if a solver is missing; else 0."""
+        return 1 if self.wrong else 2 if self.unconfirmed else 0
 
     def expect(self, is_so: bool, otherwise: str) -> None:
         """Note what does not hold, unless it is so."""
         if not is_so:
             self.wrong.append(otherwise)
 
-    @property
-    def first(self) -> str:
-        """What is wrong first, without its place; empty if nothing is."""
-        return self.wrong[0].partition("): ")[2] if self.wrong else ""
-
     @contextmanager
-    def answer(self, number: int, answer: Any, limit: Limit) -> Generator[None]:
+    def answer(self, number: int, answer: Any) -> Generator[None]:
         """Note what does not hold of an answer, or is undecided, with its place."""
         where = f"answer {number} ({answer.code}, {answer.subject:.60})"
-        limit.left = MOST_STEPS
         try:
             yield
         except DoesNotHoldError as error:
@@ -118,7 +87,11 @@ class Report:
         """Yield the report, line by line."""
         many = len(self.wrong)
         what = f"{many} {'points are' if many != 1 else 'point is'} wrong"
-        yield what if many else "the audit is right as far as it was checked again"
+        if not many:
+            what = "the audit is right as far as it was checked again"
+        if self.unconfirmed:
+            what += f"; {self.unconfirmed} answers PROVED are unconfirmed"
+        yield what
         yield from (f"WRONG: {text}" for text in self.wrong)
         counts = dict(sorted(self.counts.items()))
         for (state, _), numbers in self.undecided.items():
@@ -133,3 +106,8 @@ class Report:
             codes = dict.fromkeys(self.codes[number] for number in numbers)
             yield f"  {', '.join(codes)}{size}: {why}"
         yield f"read, and compared with nothing: {self.unchecked}"
+        if self.unconfirmed:
+            yield (
+                "no solver is at hand: install fuzzytree-toolkit[proofs], or name a "
+                "program with --solver"
+            )

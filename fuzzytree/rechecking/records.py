@@ -49,6 +49,8 @@ class Span(NamedTuple):
 
 class Proved(NamedTuple):
     how: str
+    rivals: tuple[int, ...]
+    confirmed: str
 
 
 class Computed(NamedTuple):
@@ -140,6 +142,12 @@ class DomainSide(NamedTuple):
     values: tuple[float, ...]
     is_whole: bool
     missing: float | None
+
+    @property
+    def points(self) -> list[Fraction]:
+        """The codes of categories, and the stand-in of a missing value."""
+        stand_in = () if self.missing is None else (self.missing,)
+        return [*map(Fraction, (*self.values, *stand_in))]
 
     def has(self, value: Fraction) -> bool:
         """Return whether a row can have a value."""

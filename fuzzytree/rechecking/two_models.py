@@ -1,31 +1,26 @@
 """A comparison of two models, checked again: its witnesses, and what is called alike.
 
-Rules are alike if they are the same, one after the other, whatever terms are called:
-rules of one class that follow each other may change places, and one that never fires
-or that such a neighbour hides may be missing. Systems are alike if their files are,
-but for names, units and notes. Whatever else is alike is not decided here.
+Rules are alike if no solver finds a point at which the first of the strongest rules of
+both are of different classes. Systems are alike if their files are, but for names,
+units and notes. Whatever else is alike is not decided here.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
-from collections import Counter
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Iterator
 from fractions import Fraction
 
 from fuzzytree.rechecking.case import Case, class_at, values_of
-from fuzzytree.rechecking.cells import Interval
-from fuzzytree.rechecking.checks import check_message, check_sample, check_source
-from fuzzytree.rechecking.curves import bounds, is_straight, knots
-from fuzzytree.rechecking.models import ONE, Curve, Facts, Model, Variable
-from fuzzytree.rechecking.outcomes import (
-    STEPS_IN_ALL,
-    Limit,
-    Report,
-    UndecidedError,
-    require,
+from fuzzytree.rechecking.checks import (
+    check_message,
+    check_sample,
+    check_source,
+    judge,
 )
+from fuzzytree.rechecking.claims import Statement
+from fuzzytree.rechecking.models import Facts, Model
+from fuzzytree.rechecking.outcomes import Report, UndecidedError, require
 from fuzzytree.rechecking.records import (
     Answer,
     Bracket,
@@ -38,20 +33,25 @@ from fuzzytree.rechecking.records import (
     built,
     read_json,
 )
+from fuzzytree.rechecking.smt import Script, all_of, any_of
+from fuzzytree.rechecking.solvers import ask
 
 UNCHECKED = "the version, the hashes of the models' contents, the table, the changes"
 Names = tuple[str, str, str]
 
 
-def recheck_difference(diff: bytes, old: bytes, new: bytes, names: Names) -> Report:
+def recheck_difference(
+    diff: bytes, old: bytes, new: bytes, names: Names, solver: str = ""
+) -> Report:
     """Check a comparison against the two models that it is of.
 
     `names`: what messages call the three.
 
     Raises:
-        CannotRunError: If one of them cannot be read.
+        CannotRunError: If one of them cannot be read, or the solver fails.
     """
-    facts, both = _read(diff, (old, new), names, Limit())
+    facts: Difference = built(Difference, read_json(diff, names[0]), names[0])
+    both = (Case(facts, Model(old, names[1])), Case(facts, Model(new, names[2])))
     report = Report(UNCHECKED)
     report.codes = [one.code for one in facts.answers]
     for one, case, content, name in zip(
@@ -69,66 +69,44 @@ def recheck_difference(diff: bytes, old: bytes, new: bytes, names: Names) -> Rep
     is_ok = not is_changed and not breaks
     report.expect(facts.ok is is_ok, f"it is {'' if is_ok else 'not '}ok")
     for number, answer in enumerate(facts.answers, 1):
-        _check_answer(both, report, answer, number)
+        with report.answer(number, answer):
+            _check_answer(both, report, answer, number, solver)
     return report
 
 
-def undecided_difference(
-    diff: bytes, old: bytes, new: bytes, is_late: Callable[[], bool]
-) -> dict[int, str]:
-    """Return the PROVED answers of a comparison that are not decided again here.
-
-    Returns:
-        By the position of each what is wrong with it; nothing if it is beyond the
-        limits.
-
-    Raises:
-        CannotRunError: If a model cannot be read.
-    """
-    names = "the comparison", "old.yaml", "new.yaml"
-    facts, both = _read(diff, (old, new), names, Limit(STEPS_IN_ALL, is_late))
-    result: dict[int, str] = {}
-    for place, answer in enumerate(facts.answers):
-        report = Report()
-        if isinstance(answer.state, Proved):
-            _check_answer(both, report, answer, place + 1)
-            if not report.counts["answers PROVED, decided again"]:
-                result[place] = report.first
-    return result
-
-
-def _read(
-    diff: bytes, models: tuple[bytes, bytes], names: Names, limit: Limit
-) -> tuple[Difference, tuple[Case, Case]]:
-    facts: Difference = built(Difference, read_json(diff, names[0]), names[0])
-    old, new = (
-        Case(facts, Model(content, name), limit)
-        for content, name in zip(models, names[1:], strict=True)
-    )
-    return facts, (old, new)
-
-
 def _check_answer(
-    both: tuple[Case, Case], report: Report, answer: Answer, number: int
+    both: tuple[Case, Case], report: Report, answer: Answer, number: int, solver: str
 ) -> None:
-    with report.answer(number, answer, both[0].limit):
-        check_message(answer)
-        report.counts["sentences written again"] += 1
-        state = answer.state
-        if isinstance(state, Sampled):
-            check_sample(state)
-            raise UndecidedError("a sample is not drawn again here")
-        if isinstance(state, Witness):
-            _check_witness(both, state)
-            report.counts["answers with a WITNESS, evaluated again"] += 1
-        elif isinstance(state, Proved | Computed):
-            if answer.subject != "decisions":
-                raise UndecidedError("one output of several")
-            _alike(both, str(answer.facts.get("where", "")))
-            kind = type(state).__name__.upper()
-            report.counts[f"answers {kind}, decided again"] += 1
-        else:
-            raise UndecidedError("what is open is not looked at here")
+    check_message(answer)
+    report.counts["sentences written again"] += 1
+    state = answer.state
+    if isinstance(state, Sampled):
+        check_sample(state)
+        raise UndecidedError("a sample is not drawn again here")
+    if isinstance(state, Witness):
+        _check_witness(both, state)
+        report.counts["answers with a WITNESS, evaluated again"] += 1
+    elif isinstance(state, Proved):
+        if answer.subject != "decisions":
+            raise UndecidedError("one output of several")
+        if any(case.model.form == "system" for case in both):
+            _same_systems(*(case.model for case in both))
+            report.counts["answers PROVED, read and evaluated again"] += 1
+            report.confirmed[number - 1] = "recheck"
+            return
+        script, claims = difference_claims(both, str(answer.facts.get("where", "")))
+        results = ask(script.text(), claims, solver)
+        if not results.solver:
+            report.unconfirmed += 1
+            return
+        pairs = zip(claims, results.answers, strict=True)
+        judge(pairs, is_exact=script.is_exact)
+        report.counts[f"answers PROVED, confirmed by {results.solver}"] += 1
+        report.confirmed[number - 1] = results.solver
+    elif isinstance(state, Computed):
+        report.counts["answers COMPUTED, not decided again"] += 1
+    else:
+        raise UndecidedError("what is open is not looked at here")
 
 
 def _check_witness(both: tuple[Case, Case], state: Witness) -> None:
@@ -152,86 +130,71 @@ def _check_witness(both: tuple[Case, Case], state: Witness) -> None:
 # --- what is alike
 
 
-def _alike(both: tuple[Case, Case], where: str) -> None:
-    """Check that two models decide alike.
+def difference_claims(
+    both: tuple[Case, Case], where: str
+) -> tuple[Script, list[Statement]]:
+    """Return the text of two models, and claims that they decide alike.
 
-    `where`: empty if it is so of any input, also outside of the domain.
+    `where`: empty if they do for any input, also outside of the domain.
     """
-    a, b = (case.model for case in both)
-    is_same = (a.form == "system") is (b.form == "system")
-    if a.form == "system":
-        is_same &= _system_form(a.facts) == _system_form(b.facts)
-        require(is_same or a.form == b.form, "one of them is no system")
-    else:
-        is_same &= (a.is_product, a.uncovered) == (b.is_product, b.uncovered)
-        if "missing" not in where:
-            is_same &= a.missing == b.missing and _axes(a) == _axes(b)
-        one, other = (_form(case, case.numbers, is_on_domain=False) for case in both)
-        if one != other and is_same and where:
-            one, other = (_form(c, _needed(c), is_on_domain=True) for c in both)
-        is_same &= one == other
-    if not is_same:
-        raise UndecidedError("rules that are not the same, one after the other")
+    script = Script()
+    for case, of in zip(both, ("old ", "new "), strict=True):
+        ends = {n: (Fraction(s.low), Fraction(s.high)) for n, s in case.sides.items()}
+        values = {name: side.points for name, side in case.sides.items() if where}
+        script.add(case.model, ends if where else {}, of, values)
+    if "missing" not in where:
+        require(both[0].model.missing == both[1].model.missing, "of missing values")
+    return script, [*_claims(script, both)]
 
 
-def _axes(model: Model) -> set[Hashable]:
-    return {*map(_axis, model.variables.values())}
-
-
-def _axis(variable: Variable) -> Hashable:
-    ends = (variable.low, variable.high) if variable.is_clipped else None
-    return variable.parts or variable.name, ends
-
-
-def _needed(case: Case) -> list[int]:
-    """Return the rules that fire, and that no neighbour of their class hides."""
-    kept = [n for n in case.numbers if case.beats([n], ())]
-    for number in [*kept]:
-        blocks = (
-            {*block} for _, block in itertools.groupby(kept, lambda n: case.then(n))
-        )
-        mates = next(block for block in blocks if number in block) - {number}
-        if not all(case.beats([number], [n]) for n in mates):
-            kept.remove(number)
-    return kept
-
-
-def _form(case: Case, kept: Sequence[int], *, is_on_domain: bool) -> list[Hashable]:
-    """Return what rules mean, those of one class that follow each other together."""
-    return [
-        (label, frozenset(_antecedent(case, n, is_on_domain) for n in block))
-        for label, block in itertools.groupby(kept, lambda n: case.then(n))
+def _claims(script: Script, both: tuple[Case, Case]) -> Iterator[Statement]:
+    old, new = (
+        [script.symbol(f"{of}{case.name(n)}") for n in case.numbers]
+        for case, of in zip(both, ("old ", "new "), strict=True)
+    )
+    for is_strict in (True, False):
+        wins = [
+            [_wins(case, symbols, n, is_strict=is_strict) for n in case.numbers]
+            for case, symbols in zip(both, (old, new), strict=True)
+        ]
+        for n, way in enumerate(wins[0], 1):
+            others = [
+                wins[1][m - 1]
+                for m in both[1].numbers
+                if both[1].then(m) != both[0].then(n)
+            ]
+            if both[1].rules.uncovered != both[0].then(n) and not is_strict:
+                others.append(all_of(f"(<= {one} 0.0)" for one in new))
+            text = f"where old {both[0].name(n)} decides, no new rule decides otherwise"
+            if is_strict:
+                text += ", apart from exact ties"
+            formula = all_of([way, any_of(others)])
+            yield Statement(text, formula, is_sure=is_strict)
+    bare = all_of(f"(<= {one} 0.0)" for one in old)
+    others = [
+        f"(> {new[m - 1]} 0.0)"
+        for m in both[1].numbers
+        if both[1].then(m) != both[0].rules.uncovered
     ]
+    if both[0].rules.uncovered != both[1].rules.uncovered:
+        others.append(all_of(f"(<= {one} 0.0)" for one in new))
+    text = "where no old rule fires, no new rule decides otherwise"
+    yield Statement(text, all_of([bare, any_of(others)]), is_sure=False)
 
 
-def _antecedent(case: Case, number: int, is_on_domain: bool) -> Hashable:
-    counts = Counter[Hashable]()
-    for one in case.rules.rules[number - 1].when:
-        variable = case.rules.variables[one.variable]
-        ends = case.ends(variable) if is_on_domain else None
-        curves = frozenset(_curve_form(variable.curves[t], ends) for t in one.terms)
-        counts[_axis(variable), one.negated, one.weight, curves] += 1
-    return frozenset(counts.items()) if case.rules.is_product else frozenset(counts)
+def _wins(case: Case, symbols: list[str], number: int, *, is_strict: bool) -> str:
+    """Return that a rule decides: as the first of the strongest, or strictly."""
+    own, formulas = symbols[number - 1], [f"(> {symbols[number - 1]} 0.0)"]
+    for n in case.rivals(number):
+        sign = ">" if is_strict or n < number else ">="
+        formulas.append(f"({sign} {own} {symbols[n - 1]})")
+    return all_of(formulas)
 
 
-def _curve_form(curve: Curve, ends: Interval | None) -> Hashable:
-    """Return a key, equal for straight curves of equal degrees, between some ends."""
-    if not is_straight(curve):
-        return curve
-    inner = knots(curve) or [ONE]
-    low, high = ends or (inner[0] - 1, inner[-1] + 1)
-    order = sorted({low, high, *(x for x in inner if low < x < high)})
-    result: list[tuple[Fraction | None, Fraction, Fraction, Fraction]] = []
-    for a, b in itertools.pairwise(order):
-        xs = (2 * a + b) / 3, (a + 2 * b) / 3
-        p, q = (bounds(curve, x, x)[0] for x in xs)
-        slope = (q - p) / (xs[1] - xs[0])
-        offset, degree = p - slope * xs[0], bounds(curve, a, a)[0]
-        is_on = result and result[-1][2:] == (slope, offset)
-        if not is_on or degree != slope * a + offset:
-            start = None if a == low and ends is None else a
-            result.append((start, offset if start is None else degree, slope, offset))
-    return tuple(result), ends and bounds(curve, high, high)
+def _same_systems(old: Model, new: Model) -> None:
+    require(old.form == new.form, "one of them is no system")
+    if _system_form(old.facts) != _system_form(new.facts):
+        raise UndecidedError("systems that are not the same, one rule after the other")
 
 
 def _system_form(top: Facts) -> str:

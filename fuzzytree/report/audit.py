@@ -16,6 +16,7 @@ from fuzzytree.auditing import (
     Declined,
     FileLocation,
     Measure,
+    Proved,
     Span,
     Witness,
 )
@@ -160,19 +161,17 @@ def audit_verdict(audit: Audit, gone: Collection[str] = ()) -> str:
     if gone:
         ids = counted(len(gone), "accepted finding")
         said.append(f"{ids} no longer found, which --write-baseline forgets")
+    if audit.is_complete and not findings:
+        said.append(asked_text(audit))
+    said += proved_text(audit)
     if findings:
         gravest = gravest_first(findings)[0].code
         said.append(f"`fuzzytree explain {gravest}` explains the gravest")
-    elif audit.is_complete:
-        said.append(asked_text(audit))
     return "; ".join(said)
 
 
 def found_text(audit: Audit) -> str:
-    """Return how many findings of each severity an audit has that are not accepted.
-
-    And how many of them `recheck` did not decide again, which are no errors.
-    """
+    """Return how many findings of each severity an audit has that are not accepted."""
     findings = audit.open_findings
     severities = Counter(one.severity for one in findings)
     listed = ", ".join(
@@ -180,10 +179,18 @@ def found_text(audit: Audit) -> str:
         for one, noun in SEVERITIES.items()
         if severities[one]
     )
-    weak = f" ({audit.unconfirmed} unconfirmed)" if audit.unconfirmed else ""
-    said = f"{counted(len(findings), 'finding')}{weak}: {listed}"
+    said = f"{counted(len(findings), 'finding')}: {listed}"
     accepted = f" beside {len(audit.accepted)} accepted" if audit.accepted else ""
     return f"{said if findings else 'nothing found'}{accepted}"
+
+
+def proved_text(audit: Audit) -> list[str]:
+    """Return how many answers are PROVED and by what confirmed, if any are."""
+    states = [one.state for one in audit.answers if isinstance(one.state, Proved)]
+    names = sorted({one.confirmed.split(" ")[0] for one in states} - {""})
+    many = sum(one.confirmed != "" for one in states)
+    by = f" by {' and '.join(names)}" if names else ""
+    return [f"{len(states)} PROVED, {many or 'none'} confirmed{by}"] if states else []
 
 
 def asked_text(audit: Audit) -> str:

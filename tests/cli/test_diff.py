@@ -45,10 +45,10 @@ def test_a_tree_and_its_rules_are_proved_equal(call: Call) -> None:
 def test_rules_in_another_order_are_reported_and_break_nothing(call: Call) -> None:
     code, out, _ = call("diff", "rules.yaml", "turned.yaml", "--verbose")
     assert code == 0, out
-    assert "  COMPUTED both models decide alike everywhere on the domain" in out
+    assert "  PROVED   both models decide alike everywhere on the domain" in out
     assert "2 rules stand at another place among the others" in out
     assert "               rules.yaml:" in out
-    said = "decisions are equal; 2 changes: 1 non-breaking, 1 cosmetic"
+    said = "decisions are proved equal; 2 changes: 1 non-breaking, 1 cosmetic"
     assert out.splitlines()[0] == said
 
 

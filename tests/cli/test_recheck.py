@@ -36,12 +36,12 @@ def test_an_audit_that_is_right_is_reported_with_what_was_checked(
     assert (code, err) == (0, "")
     verdict, *counts, nothing = out.splitlines()
     assert counts == [
-        "answers PROVED, decided again            1",
-        "answers with a WITNESS, evaluated again  3",
-        "claims evaluated again                   3",
-        "facts about the audit                    12",
-        "points of regions                        39",
-        "sentences written again                  4",
+        "answers PROVED, read and evaluated again  1",
+        "answers with a WITNESS, evaluated again   3",
+        "claims evaluated again                    3",
+        "facts about the audit                     12",
+        "points of regions                         39",
+        "sentences written again                   4",
     ]
     assert nothing.startswith(
         "read, and compared with nothing: the version, the hash of "

@@ -59,8 +59,11 @@ def test_alone_in_an_empty_folder_it_checks_a_real_audit(tmp_path: Path) -> None
         Path(name).write_bytes(content)
     ran = alone(tmp_path, *names)
     reported = "\n".join(recheck_files(*names).lines()) + "\n"
-    assert (ran.returncode, ran.stdout, ran.stderr) == (0, reported, "")
-    assert "answers PROVED, decided again" in reported
+    assert (ran.returncode, ran.stderr) == (2, "")
+    verdict, *_, advice = ran.stdout.splitlines()
+    assert verdict.endswith("checked again; 3 answers PROVED are unconfirmed")
+    assert advice.startswith("no solver is at hand: install fuzzytree-toolkit[proofs]")
+    assert "answers PROVED, confirmed by z3" in reported
 
 
 def test_alone_it_reports_what_is_wrong(tmp_path: Path) -> None:
@@ -75,7 +78,8 @@ def test_alone_it_reports_what_is_wrong(tmp_path: Path) -> None:
 def test_alone_it_prints_its_usage(tmp_path: Path) -> None:
     ran = alone(tmp_path, "audit.json")
     usage = (
-        "usage: python -m fuzzytree.rechecking AUDIT.json MODEL.yaml\n"
-        "       python -m fuzzytree.rechecking DIFF.json OLD.yaml NEW.yaml\n"
+        "usage: python -m fuzzytree.rechecking [--solver PROGRAM] AUDIT.json "
+        "MODEL.yaml\n       python -m fuzzytree.rechecking [--solver PROGRAM] "
+        "DIFF.json OLD.yaml NEW.yaml\n"
     )
     assert (ran.returncode, ran.stdout, ran.stderr) == (2, "", usage)

@@ -98,7 +98,10 @@ def test_yaml_that_is_not_of_its_subset_is_refused(text: str, sentence: str) -> 
     [
         ({"state": []}, "it: it cannot be {'state': []}"),
         ({"state": {}}, "it: it cannot be {'state': {}}"),
-        ({"state": "PROVED", "a\nb": 1}, "it: missing or unknown: 'a\\nb', how"),
+        (
+            {"state": "PROVED", "a\nb": 1},
+            "it: missing or unknown: 'a\\nb', confirmed, how, rivals",
+        ),
     ],
 )
 def test_a_state_that_is_none_is_one_sentence(

@@ -20,7 +20,7 @@ from tests.report.audits import LINES, every_state
 WHOLE = """\
 2 findings: 1 error, 1 warning beside 1 accepted; incomplete: the budget is spent \
 (--budget
-  SECONDS); `fuzzytree explain FT101` explains the gravest
+  SECONDS); 1 PROVED, none confirmed; `fuzzytree explain FT101` explains the gravest
 grip: audited as rules; AND is minimum, the strongest rule decides
 rows     4 of grasps.csv
 domain
@@ -185,7 +185,8 @@ def test_the_verdict_counts_and_says_what_next() -> None:
     assert audit_verdict(audit, ["FT101-0"]) == (
         "2 findings: 1 error, 1 warning beside 1 accepted; incomplete: the budget is "
         "spent (--budget SECONDS); 1 accepted finding no longer found, which "
-        "--write-baseline forgets; `fuzzytree explain FT101` explains the gravest"
+        "--write-baseline forgets; 1 PROVED, none confirmed; `fuzzytree explain FT101` "
+        "explains the gravest"
     )
     calm = replace(audit, answers=audit.answers[3:], accepted=(), is_complete=True)
     assert audit_verdict(calm) == "nothing found; 2 questions, 1 declined"

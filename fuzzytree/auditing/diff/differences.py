@@ -20,7 +20,7 @@ from fuzzytree.auditing.diff.system_differences import draft_system_changes
 from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, limited
-from fuzzytree.auditing.findings.audit import decided_twice, source_of
+from fuzzytree.auditing.findings.audit import source_of, with_confirmations
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
@@ -38,7 +38,7 @@ from fuzzytree.model import (
     name_choice,
     version,
 )
-from fuzzytree.rechecking import undecided_difference
+from fuzzytree.rechecking import Confirmation, confirm_difference
 from fuzzytree.semantics import as_rules, rules_from_tree
 
 
@@ -187,12 +187,11 @@ def _proved_twice(
 ) -> Difference:
     """Return a comparison in which PROVED is only what the re-checker decides too."""
 
-    def weak() -> Mapping[int, str]:
+    def confirmation() -> Confirmation:
         old, new = (find_format("yaml").write(model).content for model in models)
-        facts = result.to_json().encode()
-        return undecided_difference(facts, old, new, lambda: clock.is_over)
+        return confirm_difference(result.to_json().encode(), old, new)
 
-    answers = decided_twice(result.answers, weak)
+    answers = with_confirmations(result.answers, confirmation)
     return msgspec.structs.replace(result, answers=answers)
 
 

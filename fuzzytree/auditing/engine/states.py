@@ -74,13 +74,18 @@ class Span(Value, frozen=True):
 
 
 class Proved(Value, frozen=True, tag="PROVED", tag_field="state"):
-    """The claim is true on all of the domain; `recheck` decides it again.
+    """The claim is true on all of the domain.
 
     Attributes:
         how: The work of the proof with its counts, in a sentence.
+        rivals: The numbers of rules that suffice for the proof; empty for all.
+        confirmed: What confirmed it: a solver, such as `z3 4.15.4`, or `recheck`,
+            which needs none to read and evaluate; empty for nothing.
     """
 
     how: str
+    rivals: tuple[int, ...] = ()
+    confirmed: str = ""
 
 
 class Computed(Value, frozen=True, tag="COMPUTED", tag_field="state"):

@@ -42,7 +42,7 @@ from fuzzytree.auditing.findings.records import (
 )
 from fuzzytree.auditing.findings.subject import AuditView, Material, Subject
 from fuzzytree.auditing.findings.views import view
-from fuzzytree.errors import LossError
+from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import (
     Document,
@@ -52,7 +52,12 @@ from fuzzytree.model import (
     name_choice,
     version,
 )
-from fuzzytree.rechecking import CannotRunError, undecided
+from fuzzytree.rechecking import (
+    CannotRunError,
+    Confirmation,
+    claims_text,
+    confirm,
+)
 
 FamilyFunction = Callable[[Subject], Iterator[AuditAnswer]]
 
@@ -137,70 +142,79 @@ def audit(
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
-    is_class = viewed.policy.decision == "strongest" and model is viewed.system
-    whole = viewed.rules if is_class and viewed.rules is not None else model
-    result = _proved_twice(result, whole, clock)
+    result = _confirmed(result, _audited(viewed, model))
     ids = {one.id for one in result.findings}
     accepted = tuple(sorted(ids.intersection(selection.accepted)))
     result = msgspec.structs.replace(result, accepted=accepted)
     return msgspec.structs.replace(result, digest=digest_of(result))
 
 
-def _proved_twice(result: Audit, model: Document, clock: Clock) -> Audit:
-    """Return an audit in which PROVED is only what the re-checker decides as well.
+def _confirmed(result: Audit, model: Document) -> Audit:
+    """Return an audit whose PROVED answers a solver confirms, if one is at hand."""
 
-    The model is written anew, so nothing stands where it does in the user's file.
-    """
-    moved = (msgspec.structs.replace(one, places=()) for one in result.answers)
-    bare = msgspec.structs.replace(result, file=None, answers=tuple(moved))
+    def confirmation() -> Confirmation:
+        return confirm(*_for_solver(result, model))
 
-    def weak() -> Mapping[int, str]:
-        if clock.is_over:
-            raise CannotRunError("the budget was spent")
-        content = find_format("yaml").write(model).content
-        return undecided(msgspec.json.encode(bare), content, lambda: clock.is_over)
-
-    answers = decided_twice(result.answers, weak)
+    answers = with_confirmations(result.answers, confirmation)
     return msgspec.structs.replace(result, answers=answers)
 
 
-def decided_twice(
-    answers: Sequence[AuditAnswer], weak: Callable[[], Mapping[int, str]]
-) -> tuple[AuditAnswer, ...]:
-    """Return answers of which those that are not decided again are COMPUTED.
+def smt_text(result: Audit, model: Document) -> str:
+    """Return a model and what is PROVED of it as SMT-LIB 2, for any solver.
 
-    Such a finding is no error, but a warning. What the re-checker decides otherwise is
-    left out, and FT901 stands in its place.
-
-    Args:
-        answers: The answers.
-        weak: Returns by its position what is wrong with each PROVED answer that is
-            not decided again, or an empty text.
+    Raises:
+        LossError: If the model cannot be written.
+        ReadError: If it cannot be said for a solver.
     """
     try:
-        places = weak()
+        return claims_text(
+            *_for_solver(result, _audited(view(model, result.domain), model))
+        )
+    except CannotRunError as error:
+        raise ReadError(str(error)) from error
+
+
+def _audited(viewed: AuditView, model: Document) -> Document:
+    """Return what answers are about: the rules for which a system may stand."""
+    is_class = viewed.policy.decision == "strongest" and model is viewed.system
+    return viewed.rules if is_class and viewed.rules is not None else model
+
+
+def _for_solver(result: Audit, model: Document) -> tuple[bytes, bytes]:
+    """Return an audit without places, and its model written anew."""
+    moved = (msgspec.structs.replace(one, places=()) for one in result.answers)
+    bare = msgspec.structs.replace(result, file=None, answers=tuple(moved))
+    return msgspec.json.encode(bare), find_format("yaml").write(model).content
+
+
+def with_confirmations(
+    answers: Sequence[AuditAnswer], confirmation: Callable[[], Confirmation]
+) -> tuple[AuditAnswer, ...]:
+    """Return answers with what confirms each.
+
+    What it refutes is left out, and FT901 stands in its place.
+    """
+    try:
+        confirmed, refuted = confirmation()
     except (LossError, CannotRunError):
-        every = enumerate(answers)
-        places = {n: "" for n, one in every if isinstance(one.state, Proved)}
+        return (*answers,)
     result = [*answers]
-    for place, why in places.items():
-        one = result[place]
-        assert isinstance(one.state, Proved)
-        result[place] = _refuted(one, why) if why else _unconfirmed(one, one.state.how)
+    for place, one in enumerate(answers):
+        if isinstance(one.state, Proved) and place in confirmed:
+            state = msgspec.structs.replace(one.state, confirmed=confirmed[place])
+            result[place] = msgspec.structs.replace(one, state=state)
+    for place, why in refuted.items():
+        if isinstance(answers[place].state, Proved):
+            result[place] = _refuted(answers[place], why)
     return tuple(sorted(result, key=lambda one: one.code))
 
 
-def _unconfirmed(answer: AuditAnswer, how: str) -> AuditAnswer:
-    severity = "warning" if answer.severity == "error" else answer.severity
-    return msgspec.structs.replace(answer, state=Computed(how), severity=severity)
-
-
 def _refuted(answer: AuditAnswer, why: str) -> AuditAnswer:
-    """Return the finding that the re-checker decides an answer otherwise."""
+    """Return the finding that a solver refutes an answer."""
     result = audit_answer(
         "FT901.refuted",
         answer.subject,
-        Computed("each PROVED answer was decided again"),
+        Computed("each PROVED answer was checked again"),
         rules=answer.rules,
         terms=answer.terms,
         facts={"code": answer.code, "detail": why},

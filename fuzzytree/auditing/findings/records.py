@@ -14,7 +14,6 @@ from fuzzytree.auditing.engine.states import Span, State
 from fuzzytree.model import Value, summary
 from fuzzytree.rechecking import LIMITS as LIMITS
 from fuzzytree.rechecking import digest_of as digest_of_facts
-from fuzzytree.rechecking import is_unconfirmed
 
 FORMAT: Final = "fuzzytree-audit/1"
 INTERRUPTED: Final = "interrupted"
@@ -239,11 +238,6 @@ class Audit(Value, frozen=True):
         """The findings that no baseline accepts."""
         known = set(self.accepted)
         return tuple(answer for answer in self.findings if answer.id not in known)
-
-    @property
-    def unconfirmed(self) -> int:
-        """How many findings could be PROVED, and were not decided again."""
-        return sum(map(is_unconfirmed, self.open_findings))
 
     def __repr__(self) -> str:
         """Show how many answers there are, and how many of them are findings."""

@@ -79,7 +79,10 @@ def sentences(found: Difference) -> list[tuple[str, str]]:
 def test_a_model_and_itself_are_equal_on_any_input() -> None:
     found = results(grip(), grip())
     assert (found.verdict, found.ok, found.changes) == ("equal", True, ())
-    assert found.answers[0].state == Proved(
+    state = found.answers[0].state
+    assert isinstance(state, Proved)
+    assert state.confirmed.startswith("z3 ")
+    assert state.how == (
         "both take the same curves of the same inputs in the same rules, on any input"
     )
 

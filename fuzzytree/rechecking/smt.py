@@ -1,0 +1,440 @@
+"""A model as SMT-LIB 2 text: a function for each term, a constant for each rule.
+
+    (define-fun |force is low| ((x Real)) Real ...)
+    (declare-const |rule 2| Real) ; if force is high and slip is none then soft
+    (assert (= |rule 2| (min (|force is high| force) (|slip is none| slip))))
+
+It is linear under the minimum (QF_LRA) and polynomial under the product (QF_NRA). All
+numbers are exact: a double that is no short decimal is a constant such as `|0.3|`. A
+curve that is no line is a constant between two functions of lines, so what is
+unsatisfiable with them is so with the curve, and what is satisfiable may not be.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from types import MappingProxyType
+from typing import NamedTuple
+
+from fuzzytree.rechecking.curves import bounds, is_straight, knots
+from fuzzytree.rechecking.models import (
+    ONE,
+    ZERO,
+    Curve,
+    Model,
+    Proposition,
+    Rule,
+    Rules,
+    Variable,
+)
+
+Ends = tuple[Fraction, Fraction]
+CELLS, PARTS = 24, 8
+"""Into so many cells a curve is cut, and each of them to find its error."""
+_DIGITS = 12  # of a double that is a constant of its own
+_GRID = 2**12  # bounds of such a curve are rounded outwards to parts of this
+_RESERVED = re.compile(
+    "abs|acos|and|arctan|as|asin|assert|atan|concat|const|cos|default|distinct|div|e|"
+    "euler|exists|exp|extract|false|forall|if|iff|implies|is_int|ite|let|log|map|max|"
+    "min|mod|not|or|par|pi|rem|repeat|root|select|sin|sqrt|store|tan|to_int|to_real|"
+    "true|union|x|xor"
+)
+_PRELUDE = """
+(define-fun min ((a Real) (b Real)) Real (ite (<= a b) a b))
+(define-fun max ((a Real) (b Real)) Real (ite (>= a b) a b))""".strip()
+
+
+class Line(NamedTuple):
+    """A line through a point, `degree + slope (x - start)`."""
+
+    start: Fraction
+    degree: Fraction
+    slope: Fraction
+
+    def at(self, x: Fraction) -> Fraction:
+        """Return its value."""
+        return self.degree + self.slope * (x - self.start)
+
+
+class Lines(NamedTuple):
+    """A function of lines: one before each of `ends`, and one behind the last.
+
+    `values` are those at the ends, where it may jump.
+    """
+
+    lines: list[Line]
+    ends: list[Fraction]
+    values: list[Fraction]
+
+
+def lines_of(curve: Curve, low: Fraction, high: Fraction) -> tuple[Lines, Lines]:
+    """Return functions of lines below and above a curve; the same one if it is lines.
+
+    Between `low` and `high` they are near to it.
+    """
+    if is_straight(curve):
+        result = _straight(curve)
+        return result, result
+    step = Fraction(2) ** math.floor(math.log2((high - low) / CELLS))
+    start, end = math.floor(low / step) + 1, math.ceil(high / step)
+    cells = [low, *(k * step for k in range(start, end)), high]
+    both = [_enclosed(curve, a, b) for a, b in itertools.pairwise(cells)]
+    outside = Line(low, ZERO, ZERO), Line(low, curve.height, ZERO)
+    under, over = (
+        Lines(
+            [outside[side], *(pair[side] for pair in both), outside[side]],
+            cells,
+            [
+                *(pair[side].at(x) for pair, x in zip(both, cells, strict=False)),
+                both[-1][side].at(high),
+            ],
+        )
+        for side in (0, 1)
+    )
+    return under, over
+
+
+def _straight(curve: Curve) -> Lines:
+    ends = knots(curve)
+    if not ends:
+        return Lines([Line(ZERO, bounds(curve, ZERO, ZERO)[0], ZERO)], [], [])
+    outside = ends[0] - 1, ends[-1] + 1
+    lines: list[Line] = []
+    for a, b in itertools.pairwise((outside[0], *ends, outside[1])):
+        (p, _), (q, _) = (
+            bounds(curve, x, x) for x in ((2 * a + b) / 3, (a + 2 * b) / 3)
+        )
+        lines.append(Line(a, 2 * p - q, 3 * (q - p) / (b - a)))
+    return Lines(lines, ends, [bounds(curve, x, x)[0] for x in ends])
+
+
+def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> tuple[Line, Line]:
+    """Return lines below and above a curve on an interval."""
+    p, q = (_rounded(bounds(curve, x, x)[0]) for x in (low, high))
+    line = Line(low, p, (q - p) / (high - low))
+    under = over = ZERO
+    for k in range(PARTS):
+        a, b = (low + (high - low) * (k + n) / PARTS for n in (0, 1))
+        least, most = bounds(curve, a, b)
+        ends = line.at(a), line.at(b)
+        under, over = min(under, least - max(ends)), max(over, most - min(ends))
+    off = Fraction(1, _GRID)
+    return (
+        line._replace(degree=_rounded(p + under) - off),
+        line._replace(degree=_rounded(p + over) + off),
+    )
+
+
+def _rounded(x: Fraction) -> Fraction:
+    return Fraction(round(x * _GRID), _GRID)
+
+
+def all_of(formulas: Iterable[str]) -> str:
+    """Return that all formulas are true."""
+    return _joined("and", formulas, "true")
+
+
+def any_of(formulas: Iterable[str]) -> str:
+    """Return that some formula is true."""
+    return _joined("or", formulas, "false")
+
+
+def _joined(word: str, formulas: Iterable[str], empty: str) -> str:
+    every = [*dict.fromkeys(formulas)]
+    if len(every) < 2:
+        return every[0] if every else empty
+    return f"({word} {' '.join(every)})"
+
+
+class Script:
+    """The text of a model, or of two, for a solver.
+
+    Attributes:
+        is_exact: Whether no curve is enclosed by lines.
+    """
+
+    def __init__(self) -> None:
+        self.is_exact, self.is_product = True, False
+        self._lines: list[str] = []
+        self._constants: dict[str, str] = {}
+        self._symbols: dict[str, str] = {}
+        self._terms: dict[tuple[str, str, str], str] = {}
+        self._unknowns: dict[tuple[str, Curve], str] = {}
+        self._ends: dict[str, Ends] = {}
+        self._values: dict[str, Sequence[Fraction]] = {}
+
+    def add(
+        self,
+        model: Model,
+        ends: Mapping[str, Ends],
+        of: str = "",
+        values: Mapping[str, Sequence[Fraction]] = MappingProxyType({}),
+    ) -> None:
+        """Add the inputs, terms and rules of a model.
+
+        Args:
+            model: The model.
+            ends: The values of each variable of which they are known.
+            of: What stands before its names, such as `old `.
+            values: Further values of inputs, or the only ones of categories.
+        """
+        self._values |= values
+        self.is_product |= model.rules.is_product
+        self._ends |= ends
+        self._lines.append(f"; {model.name}: {len(model.rules.rules)} rules")
+        for variable in model.variables.values():
+            self._add_variable(variable, of)
+        for number, rule in enumerate(model.rules.rules, 1):
+            name = model.names[number - 1]
+            self.add_rule(f"{of}{name}", rule, model.rules, of)
+
+    # --- words
+
+    def number(self, value: Fraction) -> str:
+        """Return a number, exactly."""
+        size = abs(value)
+        short = repr(float(size))
+        if Fraction(short) == size and "e" not in short:
+            text = short
+        elif size.denominator == 1:
+            text = f"{size}.0"
+        else:
+            text = f"(/ {size.numerator}.0 {size.denominator}.0)"
+            if Fraction(float(size)) == size and len(short) <= _DIGITS:
+                self._constants[short] = text
+                text = f"|{short}|"
+        return f"(- {text})" if value < 0 else text
+
+    def symbol(self, name: str) -> str:
+        """Return a name as a symbol, another one for each name."""
+        if name not in self._symbols:
+            text = "".join("!" if c in "|\\" or ord(c) < 32 else c for c in name)
+            while _RESERVED.fullmatch(text) or f"|{text}|" in self._symbols.values():
+                text += "'"
+            self._symbols[name] = f"|{text}|"
+        return self._symbols[name]
+
+    # --- variables
+
+    def _add_variable(self, one: Variable, of: str) -> None:
+        if not one.parts and one.name in self._symbols:
+            return  # of two models
+        own = self.value(one, of)
+        if one.parts:
+            parts = (
+                f"(* {self.number(w)} (- {self.symbol(name)} {self.number(c)}))"
+                for name, w, c in one.parts
+            )
+            self._lines.append(f"(define-fun {own} () Real (+ 0.0 {' '.join(parts)}))")
+        else:
+            unit = f" ; {_plain(one.unit)}" if one.unit else ""
+            self._lines.append(f"(declare-const {own} Real){unit}")
+        self._assert_values(one, own)
+
+    def value(self, one: Variable, of: str = "") -> str:
+        """Return the symbol of a variable's value."""
+        return self.symbol(f"{of}{one.name}" if one.parts else one.name)
+
+    def _assert_values(self, one: Variable, own: str) -> None:
+        """Assert the values that an input can have."""
+        formulas, names = list[str](), ""
+        low, high = self._ends.get(one.name, (None, None))
+        if one.categories:
+            names = f" ; {_plain(', '.join(one.categories))}"
+        elif low is not None and high is not None:
+            ends = f"(<= {self.number(low)} {own}) (<= {own} {self.number(high)})"
+            formulas = [f"(and {ends})"]
+        codes = [Fraction(code) for code in range(len(one.categories))]
+        for value in self._values.get(one.name, codes):
+            formulas.append(f"(= {own} {self.number(value)})")
+        if formulas:
+            self._lines.append(f"(assert {any_of(formulas)}){names}")
+
+    # --- degrees
+
+    def degree(self, variable: Variable, term: str, of: str = "") -> str:
+        """Return the degree of a term; its function is added at its first use."""
+        key = of, variable.name, term
+        if key not in self._terms:
+            curve, own = variable.curves[term], self.value(variable, of)
+            name = f"{of}{variable.name} is {_words(term)}"
+            if is_straight(curve):
+                self._define(name, lines_of(curve, ZERO, ONE)[0])
+                self._terms[key] = f"({self.symbol(name)} {own})"
+            else:  # of two models the same curve is one unknown
+                one = own, curve
+                if one not in self._unknowns:
+                    text = self._enclose(variable, curve, name, own)
+                    self._unknowns[one] = text
+                self._terms[key] = self._unknowns[one]
+        return self._terms[key]
+
+    def _enclose(self, variable: Variable, curve: Curve, name: str, own: str) -> str:
+        """Declare the degree of a curve that is no line, with what is known of it."""
+        self.is_exact = False
+        degree, height = self.symbol(name), self.number(curve.height)
+        self._lines.append(f"(declare-const {degree} Real) ; a curve that is no line")
+        is_positive = False
+        if curve.kind != "formula":
+            ends = self._region(variable, curve)
+            is_positive = variable.name in self._ends and bounds(curve, *ends)[0] > 0
+            sides = (", at least", ", at most")
+            for side, one in zip(sides, lines_of(curve, *ends), strict=True):
+                self._define(name + side, one)
+            low, high = (f"({self.symbol(name + side)} {own})" for side in sides)
+            self._lines.append(
+                f"(assert (and (<= {low} {degree}) (<= {degree} {high})))"
+            )
+        sign = "<" if is_positive else "<="
+        self._lines.append(
+            f"(assert (and ({sign} 0.0 {degree}) (<= {degree} {height})))"
+        )
+        return degree
+
+    def _region(self, variable: Variable, curve: Curve) -> Ends:
+        """Return where a curve that is no line is enclosed closely."""
+        every = [*self._ends.get(variable.name, ())]
+        if not every or every[0] == every[1]:
+            every += knots(curve) or [ZERO]  # beyond, nothing is known
+            wide = max(every) - min(every) or ONE
+            every = [min(every) - 4 * wide, max(every) + 4 * wide]
+        if variable.missing is not None:
+            every.append(variable.missing)
+        return min(every), max(every)
+
+    def _define(self, name: str, function: Lines) -> None:
+        head = f"(define-fun {self.symbol(name)} ((x Real)) Real"
+        self._lines.append(f"{head}\n  {self._text(function)})")
+
+    def _text(self, function: Lines) -> str:
+        """Return nested cases from the left to the right."""
+        lines, ends, values = function
+        cases: list[tuple[str, Fraction, str]] = []
+        for line, after, end, value in zip(
+            lines, lines[1:], ends, values, strict=False
+        ):
+            is_on = line.at(end) == value
+            is_one = line.slope == after.slope and is_on and after.at(end) == value
+            if is_one:
+                continue
+            cases.append(("<=" if is_on else "<", end, self._line(line)))
+            if not is_on and after.at(end) != value:
+                cases.append(("<=", end, self.number(value)))
+        text = self._line(lines[-1])
+        for sign, end, piece in reversed(cases):
+            text = f"(ite ({sign} x {self.number(end)}) {piece}\n  {text})"
+        return text
+
+    def _line(self, line: Line) -> str:
+        if not line.slope:
+            return self.number(line.degree)
+        start = line.start
+        by = f"(* {self.number(line.slope)} (- x {self.number(start)}))"
+        return f"(+ {self.number(line.degree)} {by})" if line.degree else by
+
+    # --- rules
+
+    def strength(self, rule: Rule, rules: Rules, of: str = "") -> str:
+        """Return how far a rule applies."""
+        degrees = [self._proposition(one, rules, of) for one in rule.when] or ["1.0"]
+        text = degrees[0]
+        for degree in degrees[1:]:
+            text = f"({'*' if rules.is_product else 'min'} {text} {degree})"
+        return text
+
+    def _proposition(self, one: Proposition, rules: Rules, of: str) -> str:
+        variable = rules.variables[one.variable]
+        degrees = [self.degree(variable, term, of) for term in one.terms]
+        text = degrees[0]
+        for degree in degrees[1:]:
+            text = f"(max {text} {degree})"
+        text = f"(- 1.0 {text})" if one.negated else text
+        return text if one.weight == 1 else f"(* {self.number(one.weight)} {text})"
+
+    def on_axes(self, rule: Rule, rules: Rules, of: str = "") -> dict[str, str]:
+        """Return how far a rule's propositions of each variable apply."""
+        own = {one.variable: rule._replace(when=()) for one in rule.when}
+        for one in rule.when:
+            own[one.variable] = Rule((*own[one.variable].when, one), rule.then)
+        return {name: self.strength(part, rules, of) for name, part in own.items()}
+
+    def add_rule(self, name: str, rule: Rule, rules: Rules, of: str = "") -> str:
+        """Add a constant that is the strength of a rule, and return it."""
+        own, text = self.symbol(name), self.strength(rule, rules, of)
+        when = " and ".join(map(str, rule.when)).replace("\0", " ") or "anything"
+        self._lines += [
+            f"(declare-const {own} Real) ; {_plain(f'if {when} then {rule.then}')}",
+            f"(assert (= {own} {text}))",
+        ]
+        return own
+
+    # --- where rules are 0
+
+    def zero(
+        self, rule: Rule, rules: Rules, points: frozenset[str], of: str = ""
+    ) -> str:
+        """Return where a rule is 0 at a point and around it.
+
+        `points`: the variables whose values have none beside them.
+        """
+        return any_of(
+            self._zero(one, rules.variables[one.variable], one.variable in points, of)
+            for one in rule.when
+        )
+
+    def _zero(
+        self, one: Proposition, variable: Variable, is_point: bool, of: str
+    ) -> str:
+        if not one.weight:
+            return "true"
+        level, formulas = ONE if one.negated else ZERO, []
+        for term in one.terms:
+            degree, curve = self.degree(variable, term, of), variable.curves[term]
+            if is_point or not is_straight(curve):
+                formulas.append(f"(= {degree} {self.number(level)})")
+                continue
+            name = f"{of}{variable.name} is {_words(term)}: {level} around"
+            if name not in self._symbols:
+                flat = any_of(self._flat(_straight(curve), level))
+                head = f"(define-fun {self.symbol(name)} ((x Real)) Bool"
+                self._lines.append(f"{head} {flat})")
+            formulas.append(f"({self.symbol(name)} {self.value(variable, of)})")
+        return any_of(formulas) if one.negated else all_of(formulas)
+
+    def _flat(self, function: Lines, level: Fraction) -> Iterator[str]:
+        """Yield the open intervals on which a function is at a level."""
+        lines, ends, values = function
+        is_flat = [not one.slope and one.degree == level for one in lines]
+        sides: list[str] = []
+        for place, is_on in enumerate(is_flat):
+            if is_on and place == len(ends):
+                yield all_of(sides)
+            elif is_on and not (values[place] == level and is_flat[place + 1]):
+                yield all_of([*sides, f"(< x {self.number(ends[place])})"])
+            if place < len(ends) and not (is_on and values[place] == level):
+                sides = [f"(< {self.number(ends[place])} x)"]
+
+    def text(self) -> str:
+        """Return all but claims."""
+        logic = "QF_NRA" if self.is_product else "QF_LRA"
+        constants = (
+            f"(define-fun |{name}| () Real {text})"
+            for name, text in self._constants.items()
+        )
+        head = [f"(set-logic {logic})", *constants, _PRELUDE]
+        return "\n".join([*head, *self._lines]) + "\n"
+
+
+def _words(term: str) -> str:
+    """Return a term with its hedges in front."""
+    name, *hedges = term.split("\0")
+    return " ".join((*hedges, name)) or "anything"
+
+
+def _plain(text: str) -> str:
+    """Return a text for a comment, on one line."""
+    return "".join(c if c.isprintable() else " " for c in text)
