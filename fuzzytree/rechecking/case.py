@@ -37,7 +37,9 @@ from fuzzytree.rechecking.records import (
 )
 from fuzzytree.rechecking.smt import Script
 
-MOST_POINTS = 40
+MOST_POINTS = 16
+_SHOWN = ("FT101", "FT103", "FT201", "FT205")
+"""The codes whose witnesses are points at which all rules are evaluated."""
 CLOSE = Fraction(1, 2**70)
 """How far beside a point curves that are no lines are evaluated, where many are."""
 
@@ -69,6 +71,11 @@ class Case:
         script = Script()
         script.add(self.model, ends, values=values)
         return script
+
+    def reaches(self, number: int, sign: str, level: Fraction) -> str:
+        """Return that a rule's strength is `>` or `>=` a level, for a solver."""
+        rule = self.rules.rules[number - 1]
+        return self.script.reaches(rule, self.rules, sign, level)
 
     def symbol(self, number: int) -> str:
         """Return the strength of a rule, in the text for a solver."""
@@ -130,10 +137,9 @@ class Case:
         points = [
             {c.input: fraction(c.exact) for c in one.state.point}
             for one in self.answers
-            if isinstance(one.state, Witness)
+            if isinstance(one.state, Witness) and one.code in _SHOWN
         ]
         points = [p for p in points if p.keys() == {*self.inputs}]
-        points += [self.best(n) for n in self.numbers]
         chance = random.Random(0)
         for _ in range(MOST_POINTS):
             point = {}
@@ -142,8 +148,15 @@ class Case:
                 share = Fraction(chance.randrange(1025), 1024)
                 point[name] = low + (high - low) * share
             points.append(point)
-        points = [dict(p) for p in dict.fromkeys(tuple(one.items()) for one in points)]
-        return [(p, strengths(self.rules, p)) for p in points if self.is_within(p)]
+        result: list[tuple[Point, list[Between]]] = [
+            (p, strengths(self.rules, p)) for p in points if self.is_within(p)
+        ]
+        for n in self.numbers:
+            if not any(every[n - 1][0] for _, every in result):
+                best = self.best(n)
+                if self.is_within(best):
+                    result.append((best, strengths(self.rules, best)))
+        return result
 
     @cached_property
     def _values(self) -> dict[str, list[Fraction]]:
@@ -158,10 +171,9 @@ class Case:
             result[name] = ends
         return result
 
-    def best(self, *numbers: int) -> dict[str, Fraction]:
-        """Return a point at which rules are strong together, axis by axis."""
-        when = [one for n in numbers for one in self.rules.rules[n - 1].when]
-        point = {}
+    def best(self, number: int) -> dict[str, Fraction]:
+        """Return a point at which a rule is strong, axis by axis."""
+        when, point = self.rules.rules[number - 1].when, {}
         for name, values in self._values.items():
             own = [one for one in when if one.variable == name]
             part = self.rules._replace(rules=(Rule(tuple(own), ""),))
@@ -353,6 +365,8 @@ def strengths(rules: Rules, point: Point, off: Fraction = ZERO) -> list[Between]
                 low, high = low * a, high * b
             else:
                 low, high = min(low, a), min(high, b)
+            if not high:
+                break
         result.append((low, high))
     return result
 

@@ -99,7 +99,7 @@ def never_fires(case: Case, answer: Answer) -> Statements:
     for number in case.numbers:
         if of[number - 1] == of[answer.rules[0] - 1]:
             text = f"{case.name(number)} never fires"
-            yield Statement(text, f"(> {case.symbol(number)} 0.0)")
+            yield Statement(text, case.reaches(number, ">", ZERO))
 
 
 def silent(case: Case, answer: Answer) -> Statements:
@@ -311,22 +311,17 @@ def apart(case: Case, answer: Answer) -> Statements:
         rest -= meet
         omitted -= len(meet)
     require(omitted >= 0, "more pairs reach the level together")
-    at_least = case.script.number(level)
-    for number in case.numbers:
-        others = [b for a, b in sorted(rest) if a == number]
-        if others:
-            met = any_of(f"(>= {case.symbol(n)} {at_least})" for n in others)
-            formula = all_of([f"(>= {case.symbol(number)} {at_least})", met])
-            text = f"{case.name(number)} never reaches {float(level):g} together with "
-            yield Statement(text + _names(case, others), formula)
+    for pair in sorted(rest):
+        formula = all_of(case.reaches(n, ">=", level) for n in pair)
+        text = f"{_names(case, pair)} never reach {float(level):g} together"
+        yield Statement(text, formula)
 
 
 def no_higher(case: Case, answer: Answer) -> Statements:
     """Claim that two rules reach no higher level together than the reported one."""
     high = Fraction(answer.measures[-1].value) + _ROUNDED
-    most = case.script.number(high)
     text = f"{_names(case, answer.rules)} reach no more than {float(high):g} together"
-    yield Statement(text, all_of(f"(> {case.symbol(n)} {most})" for n in answer.rules))
+    yield Statement(text, all_of(case.reaches(n, ">", high) for n in answer.rules))
 
 
 def conflicting_pairs(case: Case) -> set[tuple[int, int]]:

@@ -1,8 +1,8 @@
-"""A model as SMT-LIB 2 text: a function for each term, a constant for each rule.
+"""A model as SMT-LIB 2 text: a function for each term and each rule.
 
     (define-fun |force is low| ((x Real)) Real ...)
-    (declare-const |rule 2| Real) ; if force is high and slip is none then soft
-    (assert (= |rule 2| (min (|force is high| force) (|slip is none| slip))))
+    (define-fun |rule 2| () Real ; if force is high and slip is none then soft
+      (min (|force is high| |force|) (|slip is none| |slip|)))
 
 It is linear under the minimum (QF_LRA) and polynomial under the product (QF_NRA). All
 numbers are exact: a double that is no short decimal is a constant such as `|0.3|`. A
@@ -114,6 +114,9 @@ def _straight(curve: Curve) -> Lines:
 
 def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> tuple[Line, Line]:
     """Return lines below and above a curve on an interval."""
+    whole = bounds(curve, low, high)
+    if whole[0] == whole[1]:
+        return (Line(low, whole[0], ZERO),) * 2
     p, q = (_rounded(bounds(curve, x, x)[0]) for x in (low, high))
     line = Line(low, p, (q - p) / (high - low))
     under = over = ZERO
@@ -338,6 +341,17 @@ class Script:
 
     # --- rules
 
+    def reaches(self, rule: Rule, rules: Rules, sign: str, level: Fraction) -> str:
+        """Return that a rule's strength is `>` or `>=` a level.
+
+        Under the minimum all of its degrees are, which solvers decide faster.
+        """
+        most = self.number(level)
+        if rules.is_product:
+            return f"({sign} {self.strength(rule, rules)} {most})"
+        degrees = [self._proposition(one, rules, "") for one in rule.when] or ["1.0"]
+        return all_of(f"({sign} {degree} {most})" for degree in degrees)
+
     def strength(self, rule: Rule, rules: Rules, of: str = "") -> str:
         """Return how far a rule applies."""
         degrees = [self._proposition(one, rules, of) for one in rule.when] or ["1.0"]
@@ -363,12 +377,12 @@ class Script:
         return {name: self.strength(part, rules, of) for name, part in own.items()}
 
     def add_rule(self, name: str, rule: Rule, rules: Rules, of: str = "") -> str:
-        """Add a constant that is the strength of a rule, and return it."""
+        """Add a function that is the strength of a rule, and return it."""
         own, text = self.symbol(name), self.strength(rule, rules, of)
         when = " and ".join(map(str, rule.when)).replace("\0", " ") or "anything"
         self._lines += [
-            f"(declare-const {own} Real) ; {_plain(f'if {when} then {rule.then}')}",
-            f"(assert (= {own} {text}))",
+            f"(define-fun {own} () Real ; {_plain(f'if {when} then {rule.then}')}",
+            f"  {text})",
         ]
         return own
 
