@@ -96,8 +96,8 @@ class Case:
         require(side is not None, f"the domain has no side {variable.name!r}")
         assert side is not None
         stand_in = side.low if side.missing is None else side.missing
-        every = side.low, side.high, stand_in
-        return Fraction(min(every)), Fraction(max(every))
+        numbers = side.low, side.high, stand_in
+        return Fraction(min(numbers)), Fraction(max(numbers))
 
     def then(self, number: int) -> str:
         """Return the class of a rule."""
