@@ -247,6 +247,8 @@ def _column(variable: Variable) -> dict[str, Entry]:
         entries["categories"] = Short([*variable.categories], is_run_on=True)
     if variable.missing is not None:
         entries["missing as"] = float(variable.missing)
+    if variable.is_whole:
+        entries["numbers"] = "whole"
     return entries
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,12 +52,14 @@ class TermNames:
         columns: Of the table.
         classes: Of the target.
         units: By column.
+        whole: The columns that hold whole numbers alone.
     """
 
     tree: str
     columns: Sequence[str]
     classes: Sequence[str]
     units: Mapping[str, str]
+    whole: Collection[str]
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,7 @@ def assembled(
             terms.get((feature, -1), ()),
             names.units.get(name, ""),
             *statistics.extent(feature),
+            is_whole=name in names.whole,
         )
         for feature in inputs
     ]

@@ -230,7 +230,12 @@ class ArrayLearner:
         progress = progress or (lambda _text, _share: None)
         grow = self._paper if self.settings.mode == "paper" else self._default
         grown = grow(ready, progress)
-        names = TermNames(self.name, self.columns, self.classes, self.units)
+        whole = [
+            name
+            for place, name in enumerate(self.columns)
+            if not self.categories.get(name) and self.statistics.is_whole(place)
+        ]
+        names = TermNames(self.name, self.columns, self.classes, self.units, whole)
         progress("fitting sets", 0.0)
         made = assembled(
             grown.sketch,

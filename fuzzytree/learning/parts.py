@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, float], None]
 
-MAGIC: Final = "fuzzytree state 2"
+MAGIC: Final = "fuzzytree state 3"
 """The kind and the version of a state's file."""
 
 COUNTS_MAGIC: Final = "fuzzytree leaf counts 1"

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from fuzzytree.cells import EXACT
 from fuzzytree.columns import is_missing_code
 from fuzzytree.learning.sampling import DistinctRows, Sample
 from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, padded, runs, sized
@@ -76,6 +77,7 @@ class Statistics:
     _complete: IntArray = field(init=False, repr=False)
     _lows: FloatArray = field(init=False, repr=False)
     _highs: FloatArray = field(init=False, repr=False)
+    _fractions: IntArray = field(init=False, repr=False)  # cells that may not be whole
     _sums: Sums = field(init=False, repr=False)
     _rows: DistinctRows = field(init=False, repr=False)
 
@@ -91,6 +93,7 @@ class Statistics:
         self._complete = np.zeros(self.classes, np.int64)
         self._lows = np.full(shape, np.inf)
         self._highs = np.full(shape, -np.inf)
+        self._fractions = np.zeros(self.features, np.int64)
         self._sums = Sums(self.classes, self.features)
         self._rows = DistinctRows(self.classes, self.features, self.rows_per_class)
 
@@ -138,6 +141,8 @@ class Statistics:
             return
         values, codes = self._block[: self._filled], self._block_codes[: self._filled]
         self._rows.offer(values, codes)
+        has_fraction = (np.floor(values) < values) | (np.abs(values) >= EXACT)
+        self._fractions += np.count_nonzero(has_fraction, axis=0)
         order = np.argsort(narrow(codes, self.classes), kind="stable")
         present, starts, counts = runs(codes[order])
         columns = np.take(values.T, order, axis=1)
@@ -177,6 +182,7 @@ class Statistics:
             "complete": self._complete,
             "lows": self._lows,
             "highs": self._highs,
+            "fractions": self._fractions,
         }
         arrays = {**counted, **self._sums.arrays(), **rows}
         return {name: array.reshape(-1) for name, array in arrays.items()}
@@ -193,6 +199,7 @@ class Statistics:
         self._complete = sized(arrays, "complete", np.int64, (self.classes,))
         self._lows = sized(arrays, "lows", np.float64, shape)
         self._highs = sized(arrays, "highs", np.float64, shape)
+        self._fractions = sized(arrays, "fractions", np.int64, (self.features,))
         is_count = (self._complete >= 0) & (self._complete <= self._counts)
         if not is_count.all() or self.dropped < 0:
             raise ValueError("counts a negative number of rows")
@@ -235,6 +242,7 @@ class Statistics:
         np.add.at(self._complete, positions, other._complete)
         np.minimum.at(self._lows, positions, other._lows)
         np.maximum.at(self._highs, positions, other._highs)
+        self._fractions += other._fractions
         self._sums.take(other._sums, positions, np.arange(self.features))
         self._rows.take(other._rows, positions)
 
@@ -275,6 +283,11 @@ class Statistics:
         self._absorb()
         return float(self._lows[:, feature].min()), float(self._highs[:, feature].max())
 
+    def is_whole(self, feature: int) -> bool:
+        """Return whether all known numbers of a column are whole."""
+        self._absorb()
+        return not self._fractions[feature]
+
     def sample(self) -> Sample:
         """Return the rows kept, in an order that depends on the rows alone."""
         self._absorb()
@@ -292,6 +305,7 @@ class Statistics:
         found.dropped, found.unlabelled = self.dropped, self.unlabelled
         found._counts, found._complete = self._counts.copy(), self._complete.copy()
         found._lows, found._highs = self._lows[:, kept], self._highs[:, kept]
+        found._fractions = self._fractions[[*kept]]
         found._sums = self._sums.of_features(np.array(kept, np.int64))
         found._rows = self._rows.of_columns(kept)
         return found

@@ -246,8 +246,10 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
         path: Path = ("variables", position)
         yield from input_mistakes(path, one, known)
         yield from _term_mistakes(path, one, count, nameable)
-        if one.categories or one.missing is not None:
-            text = "only rule bases and trees have categories and stand-ins"
+        if one.categories or one.missing is not None or one.is_whole:
+            text = (
+                "only rule bases and trees have categories, stand-ins and whole numbers"
+            )
             yield path, f"{text}, such as those of {one.name!r}"
         if one.clips and one.low is None and one.high is None:
             yield path, f"input {one.name!r} is clipped to a range that it lacks"

@@ -72,6 +72,8 @@ class Variable(Value, frozen=True):
             category: a point of the input space like any other. None if such a row
             is answered by the policy of the model (`Semantics.missing`). Only rule
             bases and trees have it, for input columns.
+        is_whole: Whether the values of an input column are whole numbers, of dates
+            whole days. Predictions do not depend on it; an audit does.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Variable(Value, frozen=True):
     clips: bool = False
     categories: tuple[str, ...] = ()
     missing: float | None = None
+    is_whole: bool = False
 
 
 def stand_ins(variables: Iterable[Variable]) -> dict[str, float]:
@@ -139,6 +142,8 @@ def _column_mistakes(path: Path, variable: Variable) -> Iterator[Mistake]:
     yield from name_mistakes(
         (*path, "categories"), f"category of {name!r}", variable.categories
     )
+    if variable.is_whole and (variable.parts or variable.categories):
+        yield path, f"only an input of numbers is whole, not {name!r}"
     if variable.parts and (variable.categories or missing is not None):
         yield path, f"only an input has categories or stand-ins, not the sum {name!r}"
     if missing is None:

@@ -36,6 +36,7 @@ from fuzzytree.rechecking.records import (
     fraction,
 )
 from fuzzytree.rechecking.smt import Script
+from fuzzytree.rechecking.words import value_word
 
 MOST_POINTS = 16
 _SHOWN = ("FT101", "FT103", "FT201", "FT205")
@@ -209,6 +210,10 @@ class Case:
         is_whole = point.keys() == {*self.inputs}
         require(is_whole, "the point does not have a value of every input")
         require(self.is_within(point), "the point lies outside the domain")
+        for one in coordinates:
+            column, value = self.model.variables[one.input], point[one.input]
+            word = value_word(column, self.sides.get(one.input), value)
+            require(one.word == word, f"{one.input!r} is {word!r}, not {one.word!r}")
         return point
 
     def check_point(
@@ -233,7 +238,7 @@ class Case:
             return
         ends: dict[str, tuple[Fraction, Fraction, Fraction]] = {}
         for name, side in self.sides.items():
-            span = spans.get(name, Span(name, None, None))
+            span = spans.get(name, Span(name, None, None, ""))
             low = Fraction(side.low if span.low is None else span.low)
             high = Fraction(side.high if span.high is None else span.high)
             middle = (low + high) / 2 if name in spans else point[name]

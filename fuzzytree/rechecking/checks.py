@@ -41,6 +41,7 @@ from fuzzytree.rechecking.records import (
     fraction,
 )
 from fuzzytree.rechecking.sentences import MESSAGES, sentence_of
+from fuzzytree.rechecking.words import is_plain, stretch_word
 
 LIMITS = (
     "that the rules are right: an audit finds what a rule base says, not whether it is "
@@ -159,9 +160,14 @@ def _domain(audit: Audit, case: Case, report: Report) -> None:
             expect(side.values == codes, f"{text} leaves categories out")
             expect(side.missing == stand_in, f"{text} has another stand-in")
         expect(side.missing in (None, stand_in), f"{text} has a stand-in of its own")
+        is_whole = one is not None and one.is_whole
+        expect(side.is_whole == is_whole, f"{text} has other numbers than the model's")
         is_range = side.origin == "model" and not codes
         if one is not None and is_range and not one.is_clipped:
-            is_range = (side.low, side.high) == (one.low, one.high)
+            low, high = one.low, one.high
+            if is_whole and low is not None and high is not None:
+                low, high = float(math.ceil(low)), float(math.floor(high))
+            is_range = (side.low, side.high) == (low, high)
             expect(is_range, f"{text} is not the model's range")
         if one is not None and one.is_clipped and not one.parts:
             is_in = (one.low is None or one.low <= side.low) and (
@@ -521,6 +527,17 @@ def check_spans(case: Case, region: tuple[Span, ...]) -> None:
         require(is_known, f"no variable {span.variable!r}")
         is_ordered = span.low is None or span.high is None or span.low <= span.high
         require(is_ordered, f"the region's ends in {span.variable!r} are swapped")
+        variable, side = (
+            case.model.variables[span.variable],
+            case.sides.get(span.variable),
+        )
+        word = ""
+        if not variable.parts:
+            low, high = case.ends(variable)
+            low = low if span.low is None else Fraction(span.low)
+            high = high if span.high is None else Fraction(span.high)
+            word = stretch_word(variable, side, low, high)
+        require(span.word == word, f"{span.variable!r} is {word!r}, not {span.word!r}")
 
 
 def _witness(case: Case, report: Report, answer: Answer, state: Witness) -> None:
@@ -643,7 +660,10 @@ def _shows_region(case: Case, answer: Answer, state: Witness) -> None:
     for span in state.region:
         side = case.sides.get(span.variable)
         known = ends[span.variable] | ({side.low, side.high} if side else set())
-        is_end = {span.low, span.high} <= known or side is None
+        ends = {span.low, span.high} - {None}
+        is_end = side is None or {span.low, span.high} <= known
+        if side is not None and not is_plain(side):
+            is_end = all(side.has(Fraction(end)) for end in ends if end is not None)
         require(is_end, f"the path leads elsewhere in {span.variable!r}")
 
 

@@ -68,6 +68,7 @@ class Variable(NamedTuple):
     is_clipped: bool = False
     categories: tuple[str, ...] = ()
     missing: Fraction | None = None
+    is_whole: bool = False
 
     def at(self, point: Point) -> Fraction:
         """Return its value at a point."""
@@ -535,7 +536,7 @@ def _places(items: Any) -> list[Place]:
 
 
 def _variable(one: Facts) -> Variable:
-    keys(one, "name", "terms, unit, range, sum of, categories, missing as")
+    keys(one, "name", "terms, unit, range, sum of, categories, missing as, numbers")
     ends = one.get("range", {})
     if ends.keys() - {"from", "to", "outside"}:
         raise CannotRunError("a range with other ends")
@@ -551,10 +552,9 @@ def _variable(one: Facts) -> Variable:
     curves = _curves(one.get("terms", []))
     unit, is_clipped = one.get("unit", ""), "outside" in ends
     missing = Fraction(number_of(one["missing as"])) if "missing as" in one else None
-    names = tuple(one.get("categories", ()))
-    return Variable(
-        one["name"], curves, unit, low, high, tuple(inputs), is_clipped, names, missing
-    )
+    names, parts = tuple(one.get("categories", ())), tuple(inputs)
+    rest = is_clipped, names, missing, one.get("numbers") == "whole"
+    return Variable(one["name"], curves, unit, low, high, parts, *rest)
 
 
 def _curves(terms: Iterable[Facts]) -> dict[str, Curve]:

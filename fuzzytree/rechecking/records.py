@@ -26,6 +26,7 @@ class Coordinate(NamedTuple):
     exact: str
     decimal: str
     hex: str | None
+    word: str
 
 
 class Claim(NamedTuple):
@@ -45,6 +46,7 @@ class Span(NamedTuple):
     variable: str
     low: float | None
     high: float | None
+    word: str
 
 
 class Proved(NamedTuple):

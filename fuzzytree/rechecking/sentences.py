@@ -12,7 +12,7 @@ asks for a fact and shows nothing.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 Scalar = str | int | float | None
@@ -399,7 +399,10 @@ def sentence_of(answer: Any) -> str:
     of_state = ("reason", "hits", "rows")
     facts = {name: getattr(state, name) for name in of_state if hasattr(state, name)}
     facts |= {one.name: one.value for one in answer.measures}
-    region = [(one.variable, one.low, one.high) for one in answer.region]
+    region = [
+        (one.variable, one.word) if one.word else (one.variable, one.low, one.high)
+        for one in answer.region
+    ]
     facts |= {"subject": answer.subject, "region": region} | {**answer.facts}
     return rendered(answer.message, facts)
 
@@ -482,9 +485,19 @@ Rows = Sequence[Sequence[Scalar]]
 
 
 def _within(region: Rows) -> str:
-    texts = [f"{name!r} is {_stretch(*ends)}" for name, *ends in region[:_MOST_SIDES]]
+    texts = [
+        f"{name!r} is {_side(_stretch, *of)}" for name, *of in region[:_MOST_SIDES]
+    ]
     texts += ["so on"] * (len(region) > _MOST_SIDES)
     return f"where {' and '.join(texts)}" if texts else "here"
+
+
+def _side(show: Callable[[Scalar, Scalar], str], *of: Scalar) -> str:
+    """Return an interval, or a word for it."""
+    if len(of) == 2:
+        return show(*of)
+    (word,) = of
+    return str(word)
 
 
 def _stretch(low: Scalar, high: Scalar) -> str:
@@ -498,9 +511,9 @@ def _stretch(low: Scalar, high: Scalar) -> str:
 
 def _above(box: Rows) -> str:
     texts = [
-        f"{name!r} is {open_interval(low, high)}"
-        for name, low, high in box
-        if not low is high is None
+        f"{name!r} is {_side(open_interval, *of)}"
+        for name, *of in box
+        if of != [None, None]
     ]
     return f"where {' and '.join(texts)}" if texts else "everywhere"
 

@@ -283,7 +283,10 @@ def _facts(answer: AuditAnswer) -> Iterator[tuple[str, str]]:
     yield state_word(answer.state), state_text(answer.state)
     match answer.state:
         case Witness(point=point) | Bracket(point=point) if point:
-            values = (f"{c.input} = {c.decimal} ({c.hex or c.exact})" for c in point)
+            values = (
+                f"{c.input} = {c.word or f'{c.decimal} ({c.hex or c.exact})'}"
+                for c in point
+            )
             yield "at", some(values, _MOST_INPUTS, "more inputs")
         case _:
             pass

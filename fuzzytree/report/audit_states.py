@@ -58,7 +58,9 @@ def state_note(state: State) -> str:
     """Return how an answer is known in a line: what a table has room for."""
     match state:
         case Witness(point=point):
-            shown = ", ".join(f"{one.input} = {one.decimal}" for one in point[:_SOME])
+            shown = ", ".join(
+                f"{one.input} = {one.word or one.decimal}" for one in point[:_SOME]
+            )
             more = len(point) - _SOME
             return f"at {shown}{f' and {more} more' if more > 0 else ''}"
         case Bracket(of=of, low=low, high=high):

@@ -103,7 +103,10 @@ def _answer_lines(answer: AuditAnswer, *, has_point: bool) -> Iterator[str]:
         return
     match answer.state:
         case Witness(point=point):
-            values = (f"{c.input} = {c.decimal if c.hex else c.exact}" for c in point)
+            values = (
+                f"{c.input} = {c.word or (c.decimal if c.hex else c.exact)}"
+                for c in point
+            )
             shown = some(values, _MOST_INPUTS) or "any row"
             yield from wrapped(shown, WIDTH, f"{_INDENT}at ", _INDENT)
         case state:

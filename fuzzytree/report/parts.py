@@ -100,12 +100,17 @@ def how_known(state: State) -> str | None:
 
 def coordinates(point: Sequence[Coordinate]) -> Iterator[tuple[str, str, str]]:
     """Yield the values of a point with all digits."""
-    return ((one.input, one.decimal, one.hex or one.exact) for one in point)
+    return ((one.input, one.word or one.decimal, one.hex or one.exact) for one in point)
 
 
 def as_row(point: Sequence[Coordinate]) -> str:
     """Return a point as the command takes it."""
-    return ",".join(f"{one.input}={one.decimal}" for one in point)
+    return ",".join(f"{one.input}={_bare(one)}" for one in point)
+
+
+def _bare(one: Coordinate) -> str:
+    """Return a value as options take it: a whole number without its unit."""
+    return one.decimal if one.word.startswith(one.exact) else one.word or one.decimal
 
 
 def measure_texts(measures: Sequence[Measure]) -> list[tuple[str, str, str]]:

@@ -202,6 +202,8 @@ def span_text(span: Span, unit: str = "", digits: int = 6) -> str:
         >>> span_text(Span("force", 0.5, None), "N")
         'from 0.5 N'
     """
+    if span.word:
+        return span.word
     after = f" {unit}" if unit else ""
     if span.low is not None and span.low == span.high:
         return f"at {span.low!r}{after}"

@@ -103,9 +103,29 @@ def all_inputs(old: Document, new: Document) -> tuple[str, ...]:
 
 
 def union(old: Document, new: Document) -> RuleBase:
-    """Return a rule base with the inputs of both models, and no proposition."""
-    inputs = tuple(Variable(name) for name in all_inputs(old, new))
-    return RuleBase("both", ("x",), inputs, (Rule((), "x"),))
+    """Return a rule base with the inputs of both models, and no proposition.
+
+    Raises:
+        ValueError: If a category stands at two places.
+    """
+    inputs: dict[str, Variable] = {}
+    for variable in (*old.variables, *new.variables):
+        if variable.parts:
+            continue
+        plain = msgspec.structs.replace(variable, terms=(), clips=False)
+        known = inputs.setdefault(variable.name, plain)
+        both = (known.categories, variable.categories)
+        if any(one != other for one, other in zip(*both, strict=False)):
+            raise ValueError(
+                f"the categories of {variable.name!r} are {', '.join(both[0])} in one "
+                f"model and {', '.join(both[1])} in the other, so that one code is "
+                "two values"
+            )
+        if len(both[1]) > len(both[0]):
+            inputs[variable.name] = plain
+    names = all_inputs(old, new)
+    rows = tuple(inputs[name] for name in names)
+    return RuleBase("both", ("x",), rows, (Rule((), "x"),))
 
 
 def decisions(

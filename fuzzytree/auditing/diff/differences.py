@@ -25,6 +25,7 @@ from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.findings.table_words import Words
 from fuzzytree.errors import ReadError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import (
@@ -177,7 +178,7 @@ def difference(
         domain,
         settings,
         tuple(sorted(changes, key=lambda change: order[change.grade])),
-        tuple(answers),
+        tuple(map(Words(domain, union(old, new).variables).answer, answers)),
     )
     return _proved_twice(result, both, clock)
 

@@ -157,7 +157,7 @@ def filled(base: Arrangement, point: Mapping[str, Fraction]) -> Point:
     for name in base.rules.inputs:
         side = base.domain.side(name)
         assert side is not None  # checked when the ground was made
-        middle = Fraction(side.low * 0.5 + side.high * 0.5)
+        middle = side.nearest(Fraction(side.low * 0.5 + side.high * 0.5))
         whole[name] = point.get(name, middle)
     return whole
 
@@ -174,7 +174,7 @@ def simplified(
             span = max(side.high - side.low, abs(float(value)) * 2.0**-52)
             places = digits - math.floor(math.log10(span)) - 1 if span > 0.0 else 0
             rough = round(float(value), min(places, 320))
-            near[name] = Fraction(min(max(rough, side.low), side.high))
+            near[name] = side.nearest(Fraction(rough))
         if is_within(base, near) and holds(near):
             return near
     return dict(point)

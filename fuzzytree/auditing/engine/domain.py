@@ -11,6 +11,8 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Literal
 
+from msgspec.structs import replace
+
 from fuzzytree.model import Document, Part, Value, Variable, name_choice
 
 Origin = Literal["model", "data", "spreads", "curves", "unused", "limits"]
@@ -101,6 +103,26 @@ class Domain(Value, frozen=True):
         return next((one for one in self.sides if one.variable == variable), None)
 
 
+def whole_side(side: DomainSide) -> DomainSide:
+    """Return the whole numbers of a side.
+
+    Raises:
+        ValueError: If there are none.
+
+    Example:
+        >>> side = whole_side(DomainSide("doors", 1.5, 4.5))
+        >>> side.low, side.high, side.is_whole
+        (2.0, 4.0, True)
+    """
+    low, high = float(math.ceil(side.low)), float(math.floor(side.high))
+    if low > high:
+        raise ValueError(
+            f"{side.variable!r} is a whole number, and {side.low!r} to {side.high!r} "
+            "has none"
+        )
+    return replace(side, low=low, high=high, is_whole=True)
+
+
 def limited(
     domain: Domain, limits: Mapping[str, tuple[float, float]], model: Document
 ) -> Domain:
@@ -134,9 +156,8 @@ def limited(
         missing = variable.missing
         if missing is not None and not low <= missing <= high:
             missing = None
-        sides.append(
-            DomainSide(variable.name, low, high, values=values, missing=missing)
-        )
+        side = DomainSide(variable.name, low, high, values=values, missing=missing)
+        sides.append(whole_side(side) if variable.is_whole else side)
     order = {name: place for place, name in enumerate(names)}
     return Domain(tuple(sorted(sides, key=lambda side: order[side.variable])))
 
@@ -202,6 +223,18 @@ def span(variable: Variable, domain: Domain) -> tuple[Fraction, Fraction]:
     if side is not None:
         low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))
     return low, high
+
+
+def snapped(
+    domain: Domain, variables: Iterable[Variable], point: Mapping[str, Fraction]
+) -> Point:
+    """Return the values of rows nearest to a point; itself if they leave the domain."""
+    sides = {side.variable: side for side in domain.sides}
+    near = {
+        name: sides[name].nearest(value) if name in sides else value
+        for name, value in point.items()
+    }
+    return near if contains(domain, variables, near) else dict(point)
 
 
 def contains(

@@ -18,6 +18,7 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.domain import (
     Domain,
     DomainSide,
+    snapped,
     span,
     variable_value,
 )
@@ -184,7 +185,10 @@ def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:
         for row in rows
     ]
     result = feasible(wanted, inner) or feasible(wanted, rows)
-    return None if result is None else dict(zip(tree.inputs, result, strict=True))
+    if result is None:
+        return None
+    point = dict(zip(tree.inputs, result, strict=True))
+    return snapped(box, tree.variables, point)
 
 
 def leaf_at(tree: FuzzyTree, point: Mapping[str, Fraction]) -> int:

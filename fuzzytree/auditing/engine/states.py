@@ -27,12 +27,15 @@ class Coordinate(Value, frozen=True):
         decimal: The nearest double, by its shortest decimal digits.
         hex: That double as C writes it, such as `0x1.8p+1`; None if the exact value is
             no double.
+        word: The value as a table has it: a category, a truth value, a date, a whole
+            number with its unit, `missing`; empty of another number.
     """
 
     input: str
     exact: str
     decimal: str
     hex: str | None
+    word: str = ""
 
 
 class Claim(Value, frozen=True):
@@ -66,11 +69,15 @@ class Claim(Value, frozen=True):
 
 
 class Span(Value, frozen=True):
-    """A variable's part of a region: from `low` to `high`; None has no such end."""
+    """A variable's part of a region: from `low` to `high`; None has no such end.
+
+    `word` says the values of rows in it as a table has them; empty of plain numbers.
+    """
 
     variable: str
     low: float | None
     high: float | None
+    word: str = ""
 
 
 class Proved(Value, frozen=True, tag="PROVED", tag_field="state"):

@@ -119,7 +119,11 @@ def point_with(base: Arrangement, wanted: Mapping[int, AxisStretch]) -> Point | 
                 high = high if last is None else min(high, last)
         if low > high:
             return None
-        point.append(simple(low, high))
+        value, side = simple(low, high), base.domain.side(names[place])
+        if side is not None and not side.has(value):
+            near = side.nearest((low + high) / 2)
+            value = near if low <= near <= high else value
+        point.append(value)
     if joined:
         order = sorted(joined)
         inner = {place: at for at, place in enumerate(order)}
@@ -174,7 +178,7 @@ def simplified(
         side = domain.side(name)
         for digits in _DIGITS if side else ():
             near = float(f"{float(value):.{digits}g}")
-            if side is None or not side.low <= near <= side.high:
+            if side is None or not side.has(Fraction(near)):
                 continue
             tried = {**best, name: Fraction(near)}
             if holds(tried):

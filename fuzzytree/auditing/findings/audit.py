@@ -41,6 +41,7 @@ from fuzzytree.auditing.findings.records import (
     digest_of,
 )
 from fuzzytree.auditing.findings.subject import AuditView, Material, Subject
+from fuzzytree.auditing.findings.table_words import Words
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters import find_format
@@ -121,7 +122,9 @@ def audit(
         subject = Subject(**facts, settings=settings, clock=clock, rows=rows)
         asked = {code for code in wanted if reasons.get(code) != _RAW}
         _run_all([*_tasks(asked, row)], subject, clock, progress)
-    answers = tuple(_located(progress.answers, wanted, viewed, material, repeat))
+    words = Words(viewed.domain, model.variables)
+    worded = map(words.answer, progress.answers)
+    answers = tuple(_located(worded, wanted, viewed, material, repeat))
     result = Audit(
         version=version(),
         model=model.name,

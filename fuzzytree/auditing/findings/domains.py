@@ -10,7 +10,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, whole_side
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model import (
     LR,
@@ -108,7 +108,8 @@ def _with_values(side: DomainSide, axis: _Axis, rows: FloatArray | None) -> Doma
         values = tuple(map(float, codes))
     has_missing = seen is None or rows is None or len(seen) < len(rows)
     missing = axis.missing if has_missing else None
-    return msgspec.structs.replace(side, values=values, missing=missing)
+    side = msgspec.structs.replace(side, values=values, missing=missing)
+    return whole_side(side) if axis.is_whole else side
 
 
 def _declared(axis: _Axis, values: FloatArray | None) -> DomainSide:
@@ -202,6 +203,7 @@ class _Axis(msgspec.Struct, frozen=True):
     is_used: bool
     categories: int
     missing: float | None
+    is_whole: bool
 
 
 def _axes(model: Document) -> Iterator[_Axis]:
@@ -222,7 +224,8 @@ def _axes(model: Document) -> Iterator[_Axis]:
             sets = tuple(curve for curve in own if isinstance(curve, LR))
             is_used = one.name in summed or any(curve != Band() for curve in own)
             is_open = any(map(_is_open, own))
-            facts = is_open, sets, is_used, len(one.categories), one.missing
+            rows = len(one.categories), one.missing, one.is_whole
+            facts = is_open, sets, is_used, *rows
             yield _Axis(one.name, one.low, one.high, ends, *facts)
 
 

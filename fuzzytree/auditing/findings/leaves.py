@@ -102,8 +102,12 @@ def _region(
     assert leaf_at(tree, point) == region.leaf  # a point of its box
     unions = dict(region.sides)
     cut_sides = [side for side in box.sides if side.variable in unions]
-    spans = tuple(Span(side.variable, side.low, side.high) for side in cut_sides)
-    ends = [(side.variable, *_ends(side, unions[side.variable])) for side in cut_sides]
+    hulls = [(side.variable, *side.ends) for side in cut_sides]
+    spans = tuple(Span(name, float(low), float(high)) for name, low, high in hulls)
+    ends = [
+        (side.variable, *_ends(side, unions[side.variable], subject.domain))
+        for side in cut_sides
+    ]
     claim = Claim("decides", of="tree", label=region.label)
     share = share_of(box, tree, subject.domain)
     measures = () if share is None else (Measure("share of the domain", share),)
@@ -119,8 +123,12 @@ def _region(
     )
 
 
-def _ends(side: DomainSide, union: Union) -> Interval:
+def _ends(side: DomainSide, union: Union, domain: Domain) -> Interval:
     """Return the ends of a box's side that the tree sets, and not the domain."""
+    if side == domain.side(side.variable):
+        return None, None
+    if side.values or side.is_whole:
+        return side.low, side.high
     low, high = next(
         (low, high)
         for low, high in union

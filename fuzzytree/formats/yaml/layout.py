@@ -256,6 +256,7 @@ class VariableOfModel(FileRecord, frozen=True, kw_only=True):
 
     The values of a column of text are the positions of its `categories`, from 0.
     `missing as` stands for a value that is missing, infinite or no category.
+    `numbers: whole` says that its values are whole numbers, of dates whole days.
     """
 
     noun: ClassVar[str] = "a variable"
@@ -263,6 +264,7 @@ class VariableOfModel(FileRecord, frozen=True, kw_only=True):
     unit: Name | None = None
     categories: tuple[Name, ...] = ()
     missing_as: float | None = field(name="missing as", default=None)
+    numbers: Literal["whole"] | None = None
     range: RangeOfVariable | None = None
     sum_of: tuple[PartOfSum, ...] = field(name="sum of", default=())
     terms: tuple[TermOfVariable, ...] = ()

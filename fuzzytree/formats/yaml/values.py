@@ -70,6 +70,7 @@ def variable(
         clips=clips,
         categories=one.categories,
         missing=one.missing_as,
+        is_whole=one.numbers == "whole",
     )
 
 

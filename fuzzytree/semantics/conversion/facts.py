@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Final
+from typing import Final, Literal
 
 import msgspec
 from msgspec.structs import replace
@@ -65,6 +65,7 @@ class _Named(Value, frozen=True):
     parts: tuple[Part, ...] = ()
     categories: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     missing: float | msgspec.UnsetType = msgspec.UNSET
+    is_whole: Literal[True] | msgspec.UnsetType = msgspec.UNSET
     points: tuple[int, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
@@ -130,6 +131,7 @@ def facts_of(
                 v.parts,
                 v.categories or msgspec.UNSET,
                 msgspec.UNSET if v.missing is None else v.missing,
+                True if v.is_whole else msgspec.UNSET,
                 tuple(k for k, t in enumerate(v.terms) if band_of(t.shape))
                 or msgspec.UNSET,
             )
@@ -380,6 +382,7 @@ def _rules(facts: _Facts, curves: Mapping[int, Sequence[Term]]) -> RuleBase:
             v.parts,
             categories=() if v.categories is msgspec.UNSET else v.categories,
             missing=None if v.missing is msgspec.UNSET else v.missing,
+            is_whole=v.is_whole is True,
         )
         for place, v in enumerate(facts.variables)
     )
@@ -490,7 +493,10 @@ def _plain(system: FuzzySystem, *, has_default: bool) -> object:
         system: The system.
         has_default: Whether a default can answer; of scores some rule always fires.
     """
-    inputs = (replace(one, categories=(), missing=None) for one in system.variables)
+    inputs = (
+        replace(one, categories=(), missing=None, is_whole=False)
+        for one in system.variables
+    )
     outputs = (
         replace(
             one,

@@ -97,7 +97,10 @@ def as_system(
         >>> [output.name for output in as_system(rules, "rule").outputs]
         ['score 1 class 1', 'score 2 class 1']
     """
-    inputs = tuple(replace(one, categories=(), missing=None) for one in rules.variables)
+    inputs = tuple(
+        replace(one, categories=(), missing=None, is_whole=False)
+        for one in rules.variables
+    )
     tautology: Condition | None = None
     needs_one = scores != "winner" or any(not rule.when for rule in rules.rules)
     if always != "nothing" and needs_one:

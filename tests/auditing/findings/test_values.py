@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import msgspec
 import numpy as np
 import pytest
 
+from fuzzytree import learn
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains, limited, span
 from fuzzytree.auditing.engine.regions import cut_side
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.checking import load_content
+from fuzzytree.exporters import find_format
 from fuzzytree.model import (
     Band,
     Proposition,
@@ -47,6 +51,7 @@ MODEL = RuleBase(
     ),
     Semantics("minimum"),
 )
+DOORS = Variable("age", (Term("young", Band(None, 3.0)),), "", 1.0, 5.0, is_whole=True)
 TOWN = DomainSide("town", 0.0, 2.0, "model", values=(0.0, 1.0, 2.0), missing=-1.0)
 AGE = DomainSide("age", 0.0, 99.0, "model", missing=-5.5)
 
@@ -113,3 +118,30 @@ def test_the_nearest_value_may_be_a_stand_in(value: str, nearest: float) -> None
 
 def test_the_nearest_category_is_a_category() -> None:
     assert [TOWN.nearest(Fraction(n, 2)) for n in (-9, 1, 2, 9)] == [-1, 0, 1, 2]
+
+
+def test_limits_of_whole_numbers_are_whole() -> None:
+    model = msgspec.structs.replace(MODEL, variables=(MODEL.variables[0], DOORS))
+    box = domain_of(model)
+    assert box.sides[1] == DomainSide("age", 1.0, 5.0, "model", is_whole=True)
+    side = limited(box, {"age": (1.5, 4.5)}, model).sides[1]
+    assert (side.low, side.high, side.is_whole) == (2.0, 4.0, True)
+    with pytest.raises(
+        ValueError, match=r"'age' is a whole number, and 1.5 to 1.6 has"
+    ):
+        limited(box, {"age": (1.5, 1.6)}, model)
+
+
+def test_learn_finds_the_columns_of_whole_numbers() -> None:
+    chance = np.random.default_rng(1)
+    doors, mass = chance.integers(1, 9, 200).astype(float), chance.uniform(0, 9, 200)
+    doors[::7] = np.nan
+    labels = np.where((doors > 4) | (mass > 6), "a", "b")
+    tree = learn(np.column_stack([doors, mass]), target=labels)
+    assert {one.name: one.is_whole for one in tree.variables} == {
+        "x1": True,
+        "x2": False,
+    }
+    text = find_format("yaml").write(tree).content
+    assert b"numbers: whole" in text
+    assert load_content(text, "m.yaml") == tree

@@ -1,0 +1,148 @@
+"""Values of inputs in the words of a table: categories, truth values, dates."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple, Protocol
+
+DATE_UNIT = "days since 1970-01-01"
+MISSING = "missing"
+"""The word for the stand-in of a missing value."""
+
+_EPOCH = datetime.datetime(1970, 1, 1)
+_DAY = 86_400_000_000  # microseconds
+
+
+class Column(Protocol):
+    """What a model says about the values of an input."""
+
+    @property
+    def categories(self) -> Sequence[str]: ...  # noqa: D102
+    @property
+    def unit(self) -> str: ...  # noqa: D102
+
+
+class Side(Protocol):
+    """The values that rows can have; see `DomainSide`."""
+
+    @property
+    def low(self) -> float: ...  # noqa: D102
+    @property
+    def high(self) -> float: ...  # noqa: D102
+    @property
+    def values(self) -> Sequence[float]: ...  # noqa: D102
+    @property
+    def is_whole(self) -> bool: ...  # noqa: D102
+    @property
+    def missing(self) -> float | None: ...  # noqa: D102
+
+
+class Stretch(NamedTuple):
+    """The values of rows in an interval: from low to high, and perhaps the stand-in."""
+
+    low: Fraction | None  # None if the stand-in is all
+    high: Fraction | None
+    has_missing: bool  # as one more value
+
+    def ends(self, side: Side) -> tuple[Fraction, Fraction] | None:
+        """Return the least and the largest value; None if there is none."""
+        ends = [end for end in (self.low, self.high) if end is not None]
+        if self.has_missing and side.missing is not None:
+            ends.append(Fraction(side.missing))
+        return (min(ends), max(ends)) if ends else None
+
+
+def is_plain(side: Side | None) -> bool:
+    """Return whether rows can have every number of a side and no other."""
+    return side is None or not (
+        side.values or side.is_whole or side.missing is not None
+    )
+
+
+def stretch(
+    side: Side, low: float | Fraction, high: float | Fraction, *, is_open: bool = False
+) -> Stretch:
+    """Return the values of rows from low to high; where it is open, above low."""
+    first, last = (
+        max(Fraction(side.low), Fraction(low)),
+        min(Fraction(side.high), Fraction(high)),
+    )
+    is_open = is_open and first == low
+    inside: list[Fraction] = [first, last]
+    if side.values:
+        inside = [v for v in map(Fraction, side.values) if first <= v <= last]
+        inside = inside[1:] if is_open and inside[:1] == [first] else inside
+    elif side.is_whole:
+        least = math.floor(first) + 1 if is_open else math.ceil(first)
+        inside = [Fraction(least), Fraction(math.floor(last))]
+    if inside and (
+        inside[0] > inside[-1] or (inside[0] == inside[-1] == low and is_open)
+    ):
+        inside = []
+    stand_in = side.missing
+    has_missing = stand_in is not None and low <= stand_in <= high
+    has_missing &= not (is_open and stand_in == low)
+    if has_missing and stand_in is not None and inside:
+        is_listed = not side.values or stand_in in side.values
+        is_listed &= not side.is_whole or stand_in.is_integer()
+        has_missing = not (inside[0] <= stand_in <= inside[-1] and is_listed)
+    return (
+        Stretch(inside[0], inside[-1], has_missing)
+        if inside
+        else Stretch(None, None, has_missing)
+    )
+
+
+def value_word(column: Column, side: Side | None, value: Fraction) -> str:
+    """Return a value as the table has it; empty of a number with a fraction."""
+    if side is None or (column.unit != DATE_UNIT and is_plain(side)):
+        return ""
+    if value == side.missing and stretch(side, value, value).has_missing:
+        return MISSING
+    if column.categories:
+        place = int(value)
+        is_one = value == place and 0 <= place < len(column.categories)
+        return column.categories[place] if is_one else ""
+    if column.unit == DATE_UNIT:
+        return _date(value)
+    return f"{value} {column.unit}".rstrip() if side.is_whole else ""
+
+
+def _date(days: Fraction) -> str:
+    """Return a date, with its time unless it is midnight; empty if it has no year."""
+    try:
+        moment = _EPOCH + datetime.timedelta(microseconds=round(days * _DAY))
+    except OverflowError:
+        return ""
+    return moment.date().isoformat() if days.denominator == 1 else moment.isoformat()
+
+
+def stretch_word(
+    column: Column, side: Side | None, low: float | Fraction, high: float | Fraction
+) -> str:
+    """Return the values of rows from low to high in words; empty of plain numbers."""
+    if side is None or (column.unit != DATE_UNIT and is_plain(side)):
+        return ""
+    part = stretch(side, low, high)
+    words: list[str] = []
+    if part.low is not None and part.high is not None:
+        first, last = (
+            value_word(column, side, part.low),
+            value_word(column, side, part.high),
+        )
+        if column.categories:
+            codes = (
+                v for v in map(Fraction, side.values) if part.low <= v <= part.high
+            )
+            words = [value_word(column, side, code) for code in codes]
+        elif first and last:
+            words = [first if first == last else f"{first} to {last}"]
+        elif not part.has_missing:
+            return ""
+        else:
+            words = [f"{float(part.low):.6g} to {float(part.high):.6g}"]
+    words += [MISSING] * part.has_missing
+    return " or ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
