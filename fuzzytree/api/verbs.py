@@ -48,6 +48,7 @@ from fuzzytree.model import (
     Option,
     Progress,
     RuleBase,
+    Variable,
     Written,
     as_names,
     kind_of,
@@ -551,18 +552,25 @@ def audit(
         model = material(model, data=data, target=target)
     elif data is not None or target:
         raise ValueError("a material is read already: pass its data to material()")
+    columns = {one.name: one for one in model.model.variables}
+    row: dict[str, float] = {}
+    for name, value in (where.row or {}).items():
+        column = columns.get(name, Variable(name))
+        row[name] = (
+            auditing.read_value(column, value) if isinstance(value, str) else value
+        )
     box = auditing.domain_of(
         model.model,
         within=where.within,
         spreads=where.spreads,
         rows=model.rows,
         limited=where.limits,
-        row=where.row,
+        row=row,
     )
     return auditing.audit(
         model,
         domain=auditing.limited(box, where.limits, model.model),
-        row=where.row,
+        row=row or None,
         selection=selection,
         settings=chosen,
         clock=auditing.Clock(chosen.budget_s, report=progress),
@@ -706,7 +714,7 @@ def diff(
     new: ModelSource,
     *,
     data: object = None,
-    limits: Mapping[str, tuple[float, float]] | None = None,
+    limits: auditing.Limits | None = None,
     budget_s: float = 60.0,
     settings: auditing.AuditSettings | None = None,
     allow_loss: bool = False,

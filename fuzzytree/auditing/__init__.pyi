@@ -7,7 +7,6 @@ from .diff.differences import difference as difference
 from .diff.differences import joined_domain as joined_domain
 from .engine.clock import Clock as Clock
 from .engine.domain import Domain as Domain
-from .engine.domain import limited as limited
 from .engine.states import Bracket as Bracket
 from .engine.states import Claim as Claim
 from .engine.states import Computed as Computed
@@ -36,7 +35,9 @@ from .findings.configuration import check_settings as check_settings
 from .findings.configuration import read_configuration as read_configuration
 from .findings.configuration import settings_with as settings_with
 from .findings.domains import AuditDomain as AuditDomain
+from .findings.domains import Limits as Limits
 from .findings.domains import domain_of as domain_of
+from .findings.domains import limited as limited
 from .findings.locations import ModelFile as ModelFile
 from .findings.locations import model_file as model_file
 from .findings.locations import writable as writable
@@ -53,4 +54,5 @@ from .findings.results import read_results as read_results
 from .findings.subject import AuditRows as AuditRows
 from .findings.subject import AuditView as AuditView
 from .findings.subject import Material as Material
+from .findings.table_words import read_value as read_value
 from .findings.views import view as view

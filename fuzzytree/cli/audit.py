@@ -74,7 +74,8 @@ class AuditOptions(TableOptions, FullResultOptions):
         type=float,
     )
     limits: tuple[str, ...] = several(
-        "--limits NAME=LOW:HIGH", "Range of values of a variable in the audit (repeat)."
+        "--limits NAME=LOW:HIGH",
+        "Range, or NAME=CATEGORY,..., of a variable in the audit (repeat).",
     )
     row: str | None = option(
         "--row NAME=VALUE,...",
@@ -183,8 +184,10 @@ def command(options: AuditOptions) -> int:
             domain=AuditDomain(
                 within=options.within,
                 spreads=options.spreads,
-                limits={one.variable: (one.from_, one.to) for one in known.limits}
-                | limits_of(options.limits),
+                limits={
+                    **{one.variable: (one.from_, one.to) for one in known.limits},
+                    **limits_of(options.limits),
+                },
                 row=row_of(options.row),
             ),
             selection=AuditSelection(

@@ -40,47 +40,39 @@ def codes_of(texts: Sequence[str]) -> tuple[str, ...]:
     return tuple(code.strip() for text in texts for code in text.split(","))
 
 
-def limits_of(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return the ends of variables.
+def limits_of(texts: Sequence[str]) -> dict[str, str]:
+    """Return the limits of variables, as they are written.
 
     Raises:
-        click.UsageError: If one is not NAME=LOW:HIGH.
+        click.UsageError: If one is not NAME=LOW:HIGH or NAME=CATEGORY,...
     """
-    found: dict[str, tuple[float, float]] = {}
+    found: dict[str, str] = {}
     for text in texts:
         name, _, ends = text.rpartition("=")
-        low, mark, high = ends.partition(":")
-        if not name or not mark:
-            raise click.UsageError(f"--limits {text}: must be NAME=LOW:HIGH")
+        if not name or not ends:
+            must = "must be NAME=LOW:HIGH, or NAME=CATEGORY,..."
+            raise click.UsageError(f"--limits {text}: {must}")
         if name in found:
             raise click.UsageError(f"--limits {text}: {name!r} has limits already")
-        found[name] = _number(low, text), _number(high, text)
+        found[name] = ends
     return found
 
 
-def row_of(text: str | None) -> dict[str, float] | None:
-    """Return a row.
+def row_of(text: str | None) -> dict[str, float | str] | None:
+    """Return a row, its values as they are written.
 
     Raises:
         click.UsageError: If it is not NAME=VALUE,...
     """
     if text is None:
         return None
-    found: dict[str, float] = {}
+    found: dict[str, float | str] = {}
     for part in text.split(","):
         name, _, value = part.rpartition("=")
         if not name.strip():
             raise click.UsageError(f"--row {text}: must be NAME=VALUE,NAME=VALUE,...")
-        found[name.strip()] = _number(value, text, option="--row")
+        found[name.strip()] = value
     return found
-
-
-def _number(text: str, whole: str, *, option: str = "--limits") -> float:
-    try:
-        return float(text)
-    except ValueError:
-        what = f"{option} {whole}: {text!r} is no number"
-        raise click.UsageError(what) from None
 
 
 def settings_of(

@@ -34,7 +34,8 @@ class DiffOptions(TableOptions, FullResultOptions):
         "--data TABLE", "Table of rows that both models classify."
     )
     limits: Sequence[str] = several(
-        "--limits NAME=LOW:HIGH", "Range of values of an input to compare on (repeat)."
+        "--limits NAME=LOW:HIGH",
+        "Range, or NAME=CATEGORY,..., of an input to compare on (repeat).",
     )
     budget: float = option(
         "--budget SECONDS", "Time limit of the proofs in seconds.", default=60.0

@@ -660,10 +660,10 @@ def _shows_region(case: Case, answer: Answer, state: Witness) -> None:
     for span in state.region:
         side = case.sides.get(span.variable)
         known = ends[span.variable] | ({side.low, side.high} if side else set())
-        ends = {span.low, span.high} - {None}
+        both = {span.low, span.high} - {None}
         is_end = side is None or {span.low, span.high} <= known
         if side is not None and not is_plain(side):
-            is_end = all(side.has(Fraction(end)) for end in ends if end is not None)
+            is_end = all(side.has(Fraction(end)) for end in both if end is not None)
         require(is_end, f"the path leads elsewhere in {span.variable!r}")
 
 

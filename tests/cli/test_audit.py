@@ -246,8 +246,11 @@ HELP = "\n  fuzzytree audit --help lists the options\n"
             "limits for 'frce', which is no variable; there is force, slip (did you "
             f"mean 'force'?){HELP}",
         ),
-        (("--limits", "force"), f"--limits force: must be NAME=LOW:HIGH{HELP}"),
-        (("--limits", "force=a:1"), f"--limits force=a:1: 'a' is no number{HELP}"),
+        (
+            ("--limits", "force"),
+            f"--limits force: must be NAME=LOW:HIGH, or NAME=CATEGORY,...{HELP}",
+        ),
+        (("--limits", "force=a:1"), f"'force' cannot be 'a'; it is a number{HELP}"),
         (
             ("--limits", "force=0:1", "--limits", "force=0:2"),
             f"--limits force=0:2: 'force' has limits already{HELP}",

@@ -100,7 +100,7 @@ def test_quiet_says_nothing_of_equal_models_and_the_verdict_of_others(
         ),
         (
             ("grip.yaml", "--limits", "force"),
-            "--limits force: must be NAME=LOW:HIGH",
+            "--limits force: must be NAME=LOW:HIGH, or NAME=CATEGORY,...",
         ),
         (
             ("grip.yaml", "--budget", "0"),

@@ -19,9 +19,9 @@ from fuzzytree.auditing.diff.structure import draft_changes
 from fuzzytree.auditing.diff.system_differences import draft_system_changes
 from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, limited
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import source_of, with_confirmations
-from fuzzytree.auditing.findings.domains import domain_of
+from fuzzytree.auditing.findings.domains import Limits, domain_of, limited
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
@@ -61,7 +61,7 @@ def check_common_inputs(old: Document, new: Document, names: tuple[str, str]) ->
 def joined_domain(
     old: Document,
     new: Document,
-    limits: Mapping[str, tuple[float, float]],
+    limits: Limits,
     rows: AuditRows | None = None,
 ) -> Domain:
     """Return where two models are compared: what either of them declares.

@@ -13,7 +13,7 @@ from typing import Literal
 
 from msgspec.structs import replace
 
-from fuzzytree.model import Document, Part, Value, Variable, name_choice
+from fuzzytree.model import Part, Value, Variable
 
 Origin = Literal["model", "data", "spreads", "curves", "unused", "limits"]
 """The origin of a side: the range in the model, the smallest and largest value of the
@@ -121,45 +121,6 @@ def whole_side(side: DomainSide) -> DomainSide:
             "has none"
         )
     return replace(side, low=low, high=high, is_whole=True)
-
-
-def limited(
-    domain: Domain, limits: Mapping[str, tuple[float, float]], model: Document
-) -> Domain:
-    """Return a domain with other ends for some variables.
-
-    Raises:
-        ValueError: If a variable is unknown, or ends are swapped or not finite.
-    """
-    names = [variable.name for variable in model.variables]
-    for name, (low, high) in limits.items():
-        if name not in names:
-            raise ValueError(
-                f"limits for {name!r}, which is no variable; {name_choice(name, names)}"
-            )
-        if not (math.isfinite(low) and math.isfinite(high)):
-            raise ValueError(
-                f"the limits of {name!r} must be finite, not {low!r} to {high!r}"
-            )
-        if low > high:
-            raise ValueError(
-                f"the limits of {name!r} are swapped: {low!r} to {high!r}; "
-                "the smaller one stands first"
-            )
-    sides = [side for side in domain.sides if side.variable not in limits]
-    for variable in model.variables:
-        if variable.name not in limits:
-            continue
-        low, high = limits[variable.name]
-        codes = map(float, range(len(variable.categories)))
-        values = tuple(code for code in codes if low <= code <= high)
-        missing = variable.missing
-        if missing is not None and not low <= missing <= high:
-            missing = None
-        side = DomainSide(variable.name, low, high, values=values, missing=missing)
-        sides.append(whole_side(side) if variable.is_whole else side)
-    order = {name: place for place, name in enumerate(names)}
-    return Domain(tuple(sorted(sides, key=lambda side: order[side.variable])))
 
 
 # --- variables at a point and on a box

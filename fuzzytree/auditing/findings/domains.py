@@ -12,6 +12,7 @@ import numpy as np
 
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, whole_side
 from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.findings.table_words import read_value
 from fuzzytree.model import (
     LR,
     Band,
@@ -22,9 +23,13 @@ from fuzzytree.model import (
     FuzzyTree,
     Linear,
     Points,
+    Variable,
+    name_choice,
 )
 
 Within = Literal["model", "data"]
+Limits = Mapping[str, tuple[float, float] | str]
+"""The ends of variables, or their values in words."""
 
 
 class AuditDomain(msgspec.Struct, frozen=True, kw_only=True):
@@ -33,14 +38,16 @@ class AuditDomain(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         within: The ranges that the `model` declares, or those of the `data`.
         spreads: Instead, so many spreads around the fitted sets of each input.
-        limits: The ends of some inputs; they take precedence.
-        row: A row whose nearest different decision is searched for.
+        limits: The ends of some inputs; they take precedence. A text has words of the
+            table: `200:300`, `2024-01-01:2024-02-01`, or categories: `Bern,Rom`.
+        row: A row whose nearest different decision is searched for; texts are words of
+            the table.
     """
 
     within: Within = "model"
     spreads: float | None = None
-    limits: Mapping[str, tuple[float, float]] = {}
-    row: Mapping[str, float] | None = None
+    limits: Limits = {}
+    row: Mapping[str, float | str] | None = None
 
 
 _MOST_FAULTS = 10
@@ -95,6 +102,76 @@ def domain_of(
             "\n".join(faults[:_MOST_FAULTS] + (more if faults[_MOST_FAULTS:] else []))
         )
     return Domain(tuple(sides))
+
+
+def limited(domain: Domain, limits: Limits, model: Document) -> Domain:
+    """Return a domain with other ends for some variables.
+
+    A stand-in for missing values stays where it lies between the ends, or is named.
+
+    Raises:
+        ValueError: If a variable or a value is unknown, or ends are swapped or not
+            finite.
+
+    Example:
+        >>> from fuzzytree.model import Rule, RuleBase, Variable
+        >>> city = Variable("city", categories=("Bern", "Oslo", "Rom"))
+        >>> model = RuleBase("m", ("a",), (city,), (Rule((), "a"),))
+        >>> limited(domain_of(model), {"city": "Rom,Bern"}, model).sides[0].values
+        (0.0, 2.0)
+    """
+    names = [variable.name for variable in model.variables]
+    for name in limits:
+        if name not in names:
+            raise ValueError(
+                f"limits for {name!r}, which is no variable; {name_choice(name, names)}"
+            )
+    sides = {side.variable: side for side in domain.sides}
+    for variable in model.variables:
+        if variable.name in limits:
+            sides[variable.name] = _limited_side(variable, limits[variable.name])
+    return Domain(tuple(sides[name] for name in names if name in sides))
+
+
+def _limited_side(variable: Variable, limits: tuple[float, float] | str) -> DomainSide:
+    """Return the values of a variable within limits."""
+    name, missing = variable.name, variable.missing
+    if variable.categories:
+        if not isinstance(limits, str):
+            raise ValueError(f"the limits of {name!r} are names of categories")
+        codes = sorted({read_value(variable, word) for word in limits.split(",")})
+        values = tuple(code for code in codes if code >= 0.0)
+        if not values:
+            raise ValueError(f"the limits of {name!r} have no category")
+        kept = missing if missing in codes and missing not in values else None
+        return DomainSide(name, values[0], values[-1], values=values, missing=kept)
+    low, high = _read_ends(variable, limits) if isinstance(limits, str) else limits
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise ValueError(
+            f"the limits of {name!r} must be finite, not {low!r} to {high!r}"
+        )
+    if low > high:
+        raise ValueError(
+            f"the limits of {name!r} are swapped: {low!r} to {high!r}; "
+            "the smaller one stands first"
+        )
+    is_within = missing is not None and low <= missing <= high
+    side = DomainSide(name, low, high, missing=missing if is_within else None)
+    return whole_side(side) if variable.is_whole else side
+
+
+def _read_ends(variable: Variable, text: str) -> tuple[float, float]:
+    """Return the ends that a text such as `1:2` has; a time of day has colons too."""
+    fault = ValueError(
+        f"the limits of {variable.name!r} must be LOW:HIGH, not {text!r}"
+    )
+    for place in (k for k, sign in enumerate(text) if sign == ":"):
+        try:
+            low, high = text[:place], text[place + 1 :]
+            return read_value(variable, low), read_value(variable, high)
+        except ValueError as error:
+            fault = error
+    raise fault
 
 
 def _with_values(side: DomainSide, axis: _Axis, rows: FloatArray | None) -> DomainSide:

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from fuzzytree import learn
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains, limited, span
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains, span
 from fuzzytree.auditing.engine.regions import cut_side
-from fuzzytree.auditing.findings.domains import domain_of
+from fuzzytree.auditing.findings.domains import domain_of, limited
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.checking import load_content
 from fuzzytree.exporters import find_format
 from fuzzytree.model import (
+    DATE_UNIT,
     Band,
     Proposition,
     Rule,
@@ -89,7 +90,7 @@ def test_the_span_of_an_input_reaches_to_its_stand_in() -> None:
 
 
 def test_limits_leave_out_categories_and_stand_ins_beyond_them() -> None:
-    town, age = limited(Domain((TOWN, AGE)), {"town": (1.0, 2.0)}, MODEL).sides
+    town, age = limited(Domain((TOWN, AGE)), {"town": "Oslo,Rom"}, MODEL).sides
     assert (town.values, town.missing, age) == ((1.0, 2.0), None, AGE)
 
 
@@ -145,3 +146,45 @@ def test_learn_finds_the_columns_of_whole_numbers() -> None:
     text = find_format("yaml").write(tree).content
     assert b"numbers: whole" in text
     assert load_content(text, "m.yaml") == tree
+
+
+@pytest.mark.parametrize(
+    ("limits", "values"),
+    [
+        ({"town": "Rom,Bern"}, (0.0, 2.0, None)),
+        ({"town": "Oslo,missing"}, (1.0, -1.0)),
+    ],
+)
+def test_limits_name_categories(
+    limits: dict[str, str], values: tuple[float | None, ...]
+) -> None:
+    town = limited(domain_of(MODEL), limits, MODEL).sides[0]
+    assert (*town.values, town.missing) == values
+
+
+@pytest.mark.parametrize(
+    ("limits", "text"),
+    [
+        ("Paris", "'town' cannot be 'Paris'; it is one of 'Bern', 'Oslo', 'Rom'"),
+        ("missing", "the limits of 'town' have no category"),
+        ((0.0, 1.0), "the limits of 'town' are names of categories"),
+    ],
+)
+def test_limits_of_no_category_are_refused(limits: str, text: str) -> None:
+    with pytest.raises(ValueError, match=f"^{text}$"):
+        limited(domain_of(MODEL), {"town": limits}, MODEL)
+
+
+@pytest.mark.parametrize(
+    "text", ["2024-03-01:2024-03-02", "2024-03-01T00:00:2024-03-02T00:00"]
+)
+def test_limits_of_dates_are_dates(text: str) -> None:
+    model = msgspec.structs.replace(
+        MODEL,
+        variables=(
+            MODEL.variables[0],
+            msgspec.structs.replace(DOORS, unit=DATE_UNIT),
+        ),
+    )
+    side = limited(domain_of(model), {"age": text}, model).sides[1]
+    assert (side.low, side.high) == (19783.0, 19784.0)
