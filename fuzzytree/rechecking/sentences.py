@@ -456,8 +456,8 @@ def shown(fact: Fact, how: str) -> str:
         return ""
     if fact is None and how == "q":
         return "no class"
-    if isinstance(fact, str) and how in ("", "q"):
-        return repr(fact) if how else fact
+    if isinstance(fact, str) and how in ("", "q", "s"):
+        return repr(fact) if how == "q" else fact
     if isinstance(fact, str) or fact is None or how == "q":
         raise ValueError(f"{fact!r} is not shown as {how!r}")
     if isinstance(fact, int | float):

@@ -12,6 +12,9 @@ DATE_UNIT = "days since 1970-01-01"
 MISSING = "missing"
 """The word for the stand-in of a missing value."""
 
+MOST_LISTED = 4096
+"""Whole numbers beyond which shares are those of lengths, and not of counts."""
+
 _EPOCH = datetime.datetime(1970, 1, 1)
 _DAY = 86_400_000_000  # microseconds
 
@@ -60,6 +63,18 @@ def is_plain(side: Side | None) -> bool:
     return side is None or not (
         side.values or side.is_whole or side.missing is not None
     )
+
+
+def listed(side: Side | None) -> list[Fraction]:
+    """Return the values of a side one by one, ascending; none of numbers or of many."""
+    if side is None or not (side.values or side.is_whole):
+        return []
+    values = {*map(Fraction, side.values)}
+    if side.is_whole and side.high - side.low < MOST_LISTED:
+        values = {*map(Fraction, range(int(side.low), int(side.high) + 1))}
+    if values and side.missing is not None:
+        values.add(Fraction(side.missing))
+    return sorted(values)
 
 
 def stretch(

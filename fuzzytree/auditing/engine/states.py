@@ -182,8 +182,9 @@ def coordinates(point: Mapping[str, Fraction]) -> tuple[Coordinate, ...]:
     """Return a point with all its digits.
 
     Example:
-        >>> coordinates({"x": Fraction(3, 2)})[0]
-        Coordinate(input='x', exact='3/2', decimal='1.5', hex='0x1.8000000000000p+0')
+        >>> point = coordinates({"x": Fraction(3, 2)})
+        >>> point[0].exact, point[0].decimal, point[0].hex
+        ('3/2', '1.5', '0x1.8000000000000p+0')
     """
     return tuple(_coordinate(name, value) for name, value in point.items())
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from fuzzytree.auditing.engine.lines import combined, constant, lines_of
@@ -14,6 +14,7 @@ from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges, used_terms
 from fuzzytree.model import depth
+from fuzzytree.numerics import exact_degree
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
@@ -98,6 +99,12 @@ def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
     )
 
 
+def _covered(degrees: Sequence[Fraction]) -> Fraction:
+    """Return h of the degrees of one value, as `nauck` defines it."""
+    total = sum(degrees, ZERO)
+    return total if total <= 1 else (len(degrees) - total) / (len(degrees) - 1)
+
+
 def coverage(of: VariableRange) -> Bounds:
     """Return the mean of h(x) over a range, as `nauck` defines it.
 
@@ -108,6 +115,13 @@ def coverage(of: VariableRange) -> Bounds:
         >>> coverage(VariableRange(both, Fraction(0), Fraction(1), False)).exact
         '1'
     """
+    if of.values:
+        h = [
+            _covered([exact_degree(t.shape, x) for t in of.variable.terms])
+            for x in of.values
+        ]
+        mean = sum(h, ZERO) / len(h)
+        return Bounds(mean, mean)
     curves = [lines_of(term.shape, of.low, of.high) for term in of.variable.terms]
     count = len(curves)
     level = constant(ONE, of.low, of.high)

@@ -30,6 +30,7 @@ from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import FuzzyTree
 from fuzzytree.rechecking import open_interval
+from fuzzytree.rechecking.words import listed
 
 MOST_BOXES = 20_000
 """Boxes of all leaves together, beyond which a tree's regions are not looked at."""
@@ -151,7 +152,9 @@ def share_of(box: Domain, tree: FuzzyTree, domain: Domain) -> float | None:
         if side.variable in combined:
             return None
         whole = wholes[side.variable]
-        if whole.low < whole.high:
+        if values := listed(whole):
+            share *= Fraction(len(listed(side) or side.values), len(values))
+        elif whole.low < whole.high:
             width = Fraction(whole.high) - Fraction(whole.low)
             share *= (Fraction(side.high) - Fraction(side.low)) / width
     return float(share)

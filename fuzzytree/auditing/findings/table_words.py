@@ -76,6 +76,12 @@ class Words:
                 (name, self.value(str(name), Fraction(str(text))) or text)
                 for name, text in moved
             )
+        if len({term.variable for term in answer.terms}) == 1:
+            name = answer.terms[0].variable
+            for key in {"low", "high", "at"} & facts.keys():
+                value = facts[key]
+                if isinstance(value, float):
+                    facts[key] = self.value(name, Fraction(value)) or value
         answer = replace(answer, state=state, region=region, facts=facts)
         return replace(answer, sentence=sentence_of(answer))
 

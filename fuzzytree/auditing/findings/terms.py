@@ -46,8 +46,9 @@ from fuzzytree.auditing.findings.records import (
     TermName,
 )
 from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.auditing.recheck.words import listed
 from fuzzytree.model import LR, Points, RuleBase, Shape, Term, Variable, questions
-from fuzzytree.numerics import outwards
+from fuzzytree.numerics import exact_degree, outwards
 
 
 class VariableRange(NamedTuple):
@@ -57,6 +58,7 @@ class VariableRange(NamedTuple):
     low: Fraction
     high: Fraction
     is_open: bool
+    values: Sequence[Fraction] = ()  # of rows, one by one; empty of numbers
 
     def line(self, *terms: Term) -> CurveAxis:
         """Return the curves of some terms on the range."""
@@ -94,7 +96,8 @@ def whole_ranges(subject: Subject) -> tuple[VariableRange, ...]:
         side = subject.domain.side(variable.name)
         if variable.terms:
             is_open = side is not None and side.is_open and low == side.low < high
-            result.append(VariableRange(variable, low, high, is_open))
+            values = listed(side)
+            result.append(VariableRange(variable, low, high, is_open, values))
     return tuple(result)
 
 
@@ -141,6 +144,8 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Audit
             lines = bounds.get((of.variable.name, term.name))
             axis = of.line(term)
             ((height, at),) = heights(axis)
+            if of.values:
+                height, at = _height_of_values(of, term)
             if lines is not None:
                 upper = of.line(Term(term.name, lines.upper))
                 height = Bounds(height.low, heights(upper)[0][0].high)
@@ -157,6 +162,13 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Audit
         yield audit_answer(
             "FT401.reached", "terms", proof, measures=measures, facts=facts
         )
+
+
+def _height_of_values(of: VariableRange, term: Term) -> tuple[Bounds, Fraction]:
+    """Return the largest degree of the values of rows, and the first with it."""
+    degrees = [exact_degree(term.shape, value) for value in of.values]
+    most = max(degrees)
+    return Bounds(most, most), of.values[degrees.index(most)]
 
 
 def _low_term(
@@ -292,12 +304,13 @@ def shape_answers(subject: Subject) -> Iterator[AuditAnswer]:
 
 def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
     """Yield the defects of a term's shape, None for each too small one."""
-    for excess in excesses(term.shape, of.low, of.high):
-        yield _excess(of, term, excess) if excess.depth >= SHALLOW else None
-    yield from _dips(of, term)
+    if not of.values:
+        for excess in excesses(term.shape, of.low, of.high):
+            yield _excess(of, term, excess) if excess.depth >= SHALLOW else None
+        yield from _dips(of, term)
     if isinstance(term.shape, Points) and max(term.shape.degrees) < 1.0:
         yield _subnormal(of, term, max(term.shape.degrees))
-    share = share_inside(term.shape, of)
+    share = None if of.values else share_inside(term.shape, of)
     if share is not None and 0 < share.high < Fraction(1, 2):
         yield _outlying(of, term, share)
 
@@ -392,7 +405,7 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
         shapes = [term.shape for term in terms]
         most = most_shared(shapes, float(of.low), float(of.high))
         for a, b in itertools.combinations(range(len(terms)), 2):
-            if most[a, b] < limit:
+            if most[a, b] < limit and not of.values:
                 apart += 1
                 continue
             subject.clock.check()
@@ -400,7 +413,10 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
             if len(pieces(one.shape)) + len(pieces(other.shape)) > _MOST_PIECES:
                 yield _too_large(of, one, other)
                 continue
-            shared = overlap(of.line(one, other))
+            if of.values:
+                shared = overlap_of_values(one.shape, other.shape, of.values)
+            else:
+                shared = overlap(of.line(one, other))
             jaccard = shared.jaccard
             if jaccard is None:
                 points += 1
@@ -415,6 +431,32 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
     yield from (answer for _, answer in overlaps[:MOST_SHOWN])
     if overlaps or apart or points:
         yield _other_pairs(len(overlaps), apart, points, float(limit))
+
+
+def overlap_of_values(one: Shape, other: Shape, values: Sequence[Fraction]) -> Overlap:
+    """Return how much two terms share where rows have only some values.
+
+    Each value counts alike: areas are sums over the values.
+
+    Example:
+        >>> from fuzzytree.model import Band
+        >>> both = Band(None, 1.0), Band(0.5, None)
+        >>> overlap_of_values(*both, [*map(Fraction, range(3))]).jaccard
+        Bounds(low=Fraction(1, 3), high=Fraction(1, 3))
+    """
+    pairs = [(exact_degree(one, x), exact_degree(other, x)) for x in values]
+    least = [min(pair) for pair in pairs]
+    shared, joined = sum(least, Fraction(0)), sum(map(max, pairs), Fraction(0))
+    most = max(least)
+    return Overlap(
+        Bounds(shared, shared),
+        Bounds(joined, joined),
+        Bounds(most, most),
+        values[least.index(most)],
+        (),
+        all(a <= b for a, b in pairs),
+        all(a >= b for a, b in pairs),
+    )
 
 
 def _overlapping(
