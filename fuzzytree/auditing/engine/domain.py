@@ -77,7 +77,7 @@ class DomainSide(Value, frozen=True):
         return not self.is_whole or value.denominator == 1
 
     def distance(self, one: Fraction, other: Fraction) -> Fraction:
-        """Return how far a change from one value to another goes, in widths of the side.
+        """Return how far one value is from another, in widths of the side.
 
         A change of a category is a whole width, whichever the two are, and so is one
         to or from a stand-in that is no number of the side. Whole numbers are counted

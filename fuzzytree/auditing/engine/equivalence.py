@@ -63,6 +63,7 @@ class BoxPoints:
         if missing:
             raise ValueError(f"the domain has no side for {missing[0]!r}")
         self._place = {name: number for number, name in enumerate(self.inputs)}
+        self._sides = sides
         self._ranges = [sides[name].ends for name in self.inputs]
         self._limits = [
             row_of(v, self._place, one.ends)
@@ -83,6 +84,16 @@ class BoxPoints:
             {name: one.high for name, one in whole.items()},
         ]
 
+    def has_rows(self, box: Sequence[AxisPart]) -> bool:
+        """Return whether each input of a box has a value that rows can have."""
+        return all(
+            part.low
+            <= self._sides[key].nearest((part.low + part.high) / 2)
+            <= part.high
+            for key, part in zip(self.keys, box, strict=True)
+            if isinstance(key, str)
+        )
+
     def solved(self, box: Sequence[AxisPart]) -> Point | None:
         """Return a point whose axes lie in a box, None if there is none."""
         rows = [
@@ -99,7 +110,10 @@ class BoxPoints:
 
     def in_doubles(self, point: Point) -> Point | None:
         """Return the doubles nearest to a point, if they are on the domain."""
-        near = {name: Fraction(float(point[name])) for name in self.inputs}
+        near = {
+            name: self._sides[name].nearest(Fraction(float(point[name])))
+            for name in self.inputs
+        }
         values = list(near.values())
         pairs = zip(values, self._ranges, strict=True)
         is_within = all(low <= value <= high for value, (low, high) in pairs)
@@ -273,6 +287,8 @@ class _Search:
     def _look(self, open_box: _OpenBox) -> Witness | _Cut | None:
         """Settle a box (None), find a witness in it, or say how to halve it."""
         _, box, depth, among = open_box
+        if not self.places.has_rows(box):
+            return None
         one, other = (
             contenders_on(model, propositions, self.axes, box, known)
             for model, propositions, known in zip(

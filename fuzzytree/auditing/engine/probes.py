@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.auditing.engine.arrangement import Arrangement, strength_above
-from fuzzytree.auditing.engine.domain import Domain, Point
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, Point
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
 from fuzzytree.auditing.engine.witnesses import is_within, point_with
 from fuzzytree.model import FloatArray, IntArray, RuleBase, checkpoint, shapes_of
@@ -68,6 +68,25 @@ def ends_of(domain: Domain, names: Sequence[str]) -> tuple[FloatArray, FloatArra
     return np.array(low)[:, None], np.array(high)[:, None]
 
 
+def drawn_values(side: DomainSide, shares: FloatArray) -> FloatArray:
+    """Return values of rows, spread evenly as shares from 0 to 1 are.
+
+    Example:
+        >>> from fuzzytree.auditing.engine.domain import DomainSide
+        >>> doors = DomainSide("doors", 1.0, 4.0, is_whole=True)
+        >>> drawn_values(doors, np.array([0.0, 0.3, 0.99])).tolist()
+        [1.0, 2.0, 4.0]
+    """
+    if side.values:
+        values = np.array(side.points)
+        result: FloatArray = values[(shares * len(values)).astype(np.int64)]
+        return result
+    if side.is_whole:
+        return side.low + np.floor(shares * (side.high - side.low + 1.0))
+    values = side.low * (1.0 - shares) + side.high * shares
+    return np.clip(values, side.low, side.high)
+
+
 def drawn_in(base: Arrangement, count: int, seed: int = 0) -> FloatArray | None:
     """Return points of a box that are drawn; None if it has no point.
 
@@ -79,7 +98,10 @@ def drawn_in(base: Arrangement, count: int, seed: int = 0) -> FloatArray | None:
     """
     chance = np.random.default_rng(seed)
     low, high = ends_of(base.domain, base.rules.inputs)
-    values = low + chance.random((len(low), count)) * (high - low)
+    shares = chance.random((len(low), count))
+    sides = zip(map(base.domain.side, base.rules.inputs), shares, strict=True)
+    drawn = [drawn_values(side, part) for side, part in sides if side is not None]
+    values = np.array(drawn).reshape(shares.shape)
     limited = [
         (variable, side)
         for variable in base.rules.variables

@@ -15,7 +15,8 @@ from typing import Final
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.probes import drawn_values
 from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
@@ -111,24 +112,6 @@ def sample_points(rules: RuleBase, domain: Domain, rows: int, seed: int) -> Floa
             raise ValueError(f"input {name!r} has no side in the domain")
         table[position] = drawn_values(side, chance.random(rows))
     return table[:, ~rows_outside(rules, domain, table)]
-
-
-def drawn_values(side: DomainSide, shares: FloatArray) -> FloatArray:
-    """Return values of rows, spread evenly as shares from 0 to 1 are.
-
-    Example:
-        >>> doors = DomainSide("doors", 1.0, 4.0, is_whole=True)
-        >>> drawn_values(doors, np.array([0.0, 0.3, 0.99])).tolist()
-        [1.0, 2.0, 4.0]
-    """
-    if side.values:
-        values = np.array(side.points)
-        result: FloatArray = values[(shares * len(values)).astype(np.int64)]
-        return result
-    if side.is_whole:
-        return side.low + np.floor(shares * (side.high - side.low + 1.0))
-    values = side.low * (1.0 - shares) + side.high * shares
-    return np.clip(values, side.low, side.high)
 
 
 def rows_outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArray:

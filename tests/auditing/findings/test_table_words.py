@@ -62,7 +62,7 @@ def table(path: Path) -> Path:
 @pytest.fixture(scope="module")
 def tree(tmp_path_factory: pytest.TempPathFactory) -> FuzzyTree:
     path = table(tmp_path_factory.mktemp("table") / "t.csv")
-    settings = ft.LearningSettings(columns_per_node=1, leaves=8)
+    settings = ft.LearningSettings(columns_per_node=1, leaves=5)
     return ft.learn(str(path), target="label", settings=settings)
 
 
