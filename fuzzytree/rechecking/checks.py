@@ -160,6 +160,9 @@ def _domain(audit: Audit, case: Case, report: Report) -> None:
             expect(side.values == codes, f"{text} leaves categories out")
             expect(side.missing == stand_in, f"{text} has another stand-in")
         expect(side.missing in (None, stand_in), f"{text} has a stand-in of its own")
+        if one is not None:
+            word = stretch_word(one, side, *case.ends(one)) if not one.parts else ""
+            expect(side.word == word, f"{text} is {word!r} in words")
         is_whole = one is not None and one.is_whole
         expect(side.is_whole == is_whole, f"{text} has other numbers than the model's")
         is_range = side.origin == "model" and not codes

@@ -144,6 +144,7 @@ class DomainSide(NamedTuple):
     values: tuple[float, ...]
     is_whole: bool
     missing: float | None
+    word: str
 
     @property
     def points(self) -> list[Fraction]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 DATE_UNIT = "days since 1970-01-01"
 MISSING = "missing"
@@ -19,28 +18,11 @@ _EPOCH = datetime.datetime(1970, 1, 1)
 _DAY = 86_400_000_000  # microseconds
 
 
-class Column(Protocol):
-    """What a model says about the values of an input."""
+Column = Any
+"""What a model says about an input: its `categories` and `unit`."""
 
-    @property
-    def categories(self) -> Sequence[str]: ...  # noqa: D102
-    @property
-    def unit(self) -> str: ...  # noqa: D102
-
-
-class Side(Protocol):
-    """The values that rows can have; see `DomainSide`."""
-
-    @property
-    def low(self) -> float: ...  # noqa: D102
-    @property
-    def high(self) -> float: ...  # noqa: D102
-    @property
-    def values(self) -> Sequence[float]: ...  # noqa: D102
-    @property
-    def is_whole(self) -> bool: ...  # noqa: D102
-    @property
-    def missing(self) -> float | None: ...  # noqa: D102
+Side = Any
+"""The values that rows can have, as a `DomainSide` of an audit or of its file."""
 
 
 class Stretch(NamedTuple):

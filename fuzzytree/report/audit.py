@@ -234,7 +234,7 @@ def _head(audit: Audit, *, is_verbose: bool) -> Iterator[str]:
     rows = [
         (
             f"  {_name(one.variable)}",
-            f"{number(one.low)} to {number(one.high)}",
+            _name(one.word) or f"{number(one.low)} to {number(one.high)}",
             ORIGINS[one.origin],
         )
         for one in sides[:_MOST_INPUTS]

@@ -127,8 +127,10 @@ class Scene(NamedTuple):
 def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
     """Return a picture of each variable that a finding is about, with its region."""
     point: dict[str, Fraction] = {}
+    words: dict[str, str] = {}
     if isinstance(answer.state, (Witness, Bracket)):
         point = point_of(answer.state.point)
+        words = {one.input: one.word for one in answer.state.point}
     spans = answer.region
     if not spans and isinstance(answer.state, Witness):
         spans = answer.state.region
@@ -137,7 +139,12 @@ def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
     shown = _concerning(answer, region, values, scene)
     bars = [
         (
-            _bar_text(axis, region.get(axis.name), values.get(axis.name)),
+            _bar_text(
+                axis,
+                region.get(axis.name),
+                values.get(axis.name),
+                words.get(axis.name, ""),
+            ),
             terms_picture(
                 axis,
                 None,
@@ -153,9 +160,9 @@ def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
     return part("pictures", bars, undrawn)
 
 
-def _bar_text(axis: Axis, span: Span | None, value: float | None) -> str:
+def _bar_text(axis: Axis, span: Span | None, value: float | None, word: str) -> str:
     said = [span_text(span, axis.unit, 3)] if span else []
-    said += [] if value is None else [f"witness {value:.4g}"]
+    said += [] if value is None else [f"witness {word or f'{value:.4g}'}"]
     return f"{axis.name}: {'; '.join(said)}" if said else axis.name
 
 

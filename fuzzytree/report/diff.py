@@ -36,7 +36,8 @@ def diff_lines(difference: Difference, *, is_verbose: bool = False) -> Iterator[
         yield f"rows     {difference.rows} of {difference.data.name}"
     if is_verbose:
         shown = [
-            f"{s.variable} {s.low:.6g} to {s.high:.6g}" for s in difference.domain.sides
+            f"{s.variable} {s.word or f'{s.low:.6g} to {s.high:.6g}'}"
+            for s in difference.domain.sides
         ]
         domain = ", ".join(shown) or "no inputs"
         yield from wrapped(domain, WIDTH, "domain   ", " " * 9)

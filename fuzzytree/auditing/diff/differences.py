@@ -169,16 +169,17 @@ def difference(
         )
         for model, file in zip(both, files, strict=True)
     )
+    words = Words(domain, union(old, new).variables)
     result = Difference(
         version(),
         one,
         other,
         data,
         0 if rows is None else rows.values.shape[1],
-        domain,
+        words.domain,
         settings,
         tuple(sorted(changes, key=lambda change: order[change.grade])),
-        tuple(map(Words(domain, union(old, new).variables).answer, answers)),
+        tuple(map(words.answer, answers)),
     )
     return _proved_twice(result, both, clock)
 

@@ -35,6 +35,7 @@ class DomainSide(Value, frozen=True):
         is_whole: Whether only whole numbers are; both ends are whole then.
         missing: The stand-in of a missing value: one more value of rows, which may lie
             beyond the ends or between whole numbers.
+        word: All values as a table has them, as of `Span`; only in results.
     """
 
     variable: str
@@ -45,6 +46,7 @@ class DomainSide(Value, frozen=True):
     values: tuple[float, ...] = ()
     is_whole: bool = False
     missing: float | None = None
+    word: str = ""
 
     @property
     def points(self) -> tuple[float, ...]:

@@ -134,7 +134,7 @@ def audit(
         data=material.data,
         rows=0 if rows is None else rows.values.shape[1],
         policy=viewed.policy,
-        domain=viewed.domain,
+        domain=words.domain,
         settings=settings,
         answers=answers,
         unasked=tuple(_unasked(viewed.policy, wanted, progress, reasons)),

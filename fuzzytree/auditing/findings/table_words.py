@@ -36,6 +36,13 @@ class Words:
         self._columns = {one.name: one for one in variables if not one.parts}
         self._sides = {side.variable: side for side in domain.sides}
 
+    @property
+    def domain(self) -> Domain:
+        """The domain with its words."""
+        spans = {name: self.span(Span(name, None, None)) for name in self._sides}
+        sides = self._sides.items()
+        return Domain(tuple(replace(one, word=spans[name].word) for name, one in sides))
+
     def value(self, name: str, value: Fraction) -> str:
         """Return a value of an input in words; empty of a number with a fraction."""
         column = self._columns.get(name)
