@@ -18,6 +18,7 @@ from fuzzytree.rechecking.outcomes import (
     DoesNotHoldError,
     require,
 )
+from fuzzytree.rechecking.words import stretch
 from fuzzytree.rechecking.yaml import MOST_BYTES
 
 
@@ -154,9 +155,7 @@ class DomainSide(NamedTuple):
 
     def has(self, value: Fraction) -> bool:
         """Return whether a row can have a value."""
-        is_listed = not self.values or value in self.values
-        is_listed &= not self.is_whole or value.denominator == 1
-        return value == self.missing or (self.low <= value <= self.high and is_listed)
+        return stretch(self, value, value).ends(self) is not None
 
 
 class Domain(NamedTuple):

@@ -105,12 +105,7 @@ def coordinates(point: Sequence[Coordinate]) -> Iterator[tuple[str, str, str]]:
 
 def as_row(point: Sequence[Coordinate]) -> str:
     """Return a point as the command takes it."""
-    return ",".join(f"{one.input}={_bare(one)}" for one in point)
-
-
-def _bare(one: Coordinate) -> str:
-    """Return a value as options take it: a whole number without its unit."""
-    return one.decimal if one.word.startswith(one.exact) else one.word or one.decimal
+    return ",".join(f"{one.input}={one.word or one.decimal}" for one in point)
 
 
 def measure_texts(measures: Sequence[Measure]) -> list[tuple[str, str, str]]:

@@ -13,6 +13,7 @@ from typing import Literal
 
 from msgspec.structs import replace
 
+from fuzzytree.auditing.recheck.words import stretch
 from fuzzytree.model import Part, Value, Variable
 
 Origin = Literal["model", "data", "spreads", "curves", "unused", "limits"]
@@ -70,13 +71,9 @@ class DomainSide(Value, frozen=True):
             >>> [doors.has(Fraction(n, 2)) for n in (2, 3, 5, 12)]
             [True, False, True, False]
         """
-        if value == self.missing:
-            return True
-        if not self.low <= value <= self.high or (self.is_open and value == self.low):
+        if self.is_open and value == self.low != self.missing:
             return False
-        if self.values:
-            return value in self.values
-        return not self.is_whole or value.denominator == 1
+        return stretch(self, value, value).ends(self) is not None
 
     def distance(self, one: Fraction, other: Fraction) -> Fraction:
         """Return how far one value is from another, in widths of the side.

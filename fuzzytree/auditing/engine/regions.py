@@ -143,7 +143,8 @@ def cut_side(side: DomainSide, interval: Interval) -> DomainSide | None:
     high = side.high if above is None else min(side.high, above)
     values = tuple(value for value in side.values if _is_in(value, interval))
     if side.is_whole:
-        low, high, is_open = math.floor(low) + is_open, math.floor(high), False
+        low, is_open = float(math.floor(low) + is_open), False
+        high = float(math.floor(high))
     elif values:
         low, high, is_open = values[0], values[-1], False
     if (

@@ -121,7 +121,8 @@ def read_value(variable: Variable, text: str) -> float:
             "a date such as 2024-03-01" if variable.unit == DATE_UNIT else "a number"
         )
         try:
-            value = float(text) if days is None else days
+            number = text.removesuffix(variable.unit)
+            value = float(number) if days is None else days
         except ValueError:
             value = None
     is_missing = text in ("", MISSING) and text not in variable.categories

@@ -157,5 +157,6 @@ def test_words_are_read_as_the_table_is() -> None:
     day = Variable("day", unit=DATE_UNIT)
     assert [read_value(member, one) for one in ("true", "", "missing")] == [1, -1, -1]
     assert [read_value(day, one) for one in ("1970-01-02", "5")] == [1, 5]
+    assert read_value(Variable("mass", unit="kg"), "3 kg") == 3
     with pytest.raises(ValueError, match="it is a date such as 2024-03-01"):
         read_value(day, "tomorrow")
