@@ -13,7 +13,7 @@ from typing import Literal
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.recheck.words import stretch
+from fuzzytree.rechecking.words import stretch
 from fuzzytree.model import Part, Value, Variable
 
 Origin = Literal["model", "data", "spreads", "curves", "unused", "limits"]

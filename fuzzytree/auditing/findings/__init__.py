@@ -9,6 +9,7 @@ An audit
     - `audit`: runs all families within the budget
     - `domains`, `views`, `system_conditions`: the domain; the rules of a model as a
       rule base; terms and conditions of fuzzy systems as propositions
+    - `table_words`: values of inputs as their table has them, shown and read
     - `curve_bounds`, `rule_bounds`, `bounded_arrangement`: lower and upper bounds of
       curves that are not polynomial, and of rules with them or with weights
     - `locations`: where rules stand in a file; ids that do not depend on their order

@@ -46,7 +46,7 @@ from fuzzytree.auditing.findings.records import (
     TermName,
 )
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.recheck.words import listed
+from fuzzytree.rechecking.words import listed
 from fuzzytree.model import LR, Points, RuleBase, Shape, Term, Variable, questions
 from fuzzytree.numerics import exact_degree, outwards
 
