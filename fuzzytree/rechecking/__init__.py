@@ -122,7 +122,7 @@ def _decide(case: Case, report: Report, asked: Asked, solver: str) -> None:
     """Ask a solver for all claims, and note which answers it confirms."""
     asked = [one for one in asked if one[2]]
     every = [claim for *_, claims in asked for claim in claims]
-    if not every:
+    if not every and not solver:
         return
     results = ask(case.script.text(), every, solver)
     answers = iter(results.answers)

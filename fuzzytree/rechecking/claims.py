@@ -324,6 +324,14 @@ def no_higher(case: Case, answer: Answer) -> Statements:
     yield Statement(text, all_of(case.reaches(n, ">", high) for n in answer.rules))
 
 
+def ties(case: Case, answer: Answer) -> Statements:
+    """Check the number of pairs that tie; that others do not is not decided."""
+    listed = len(case.coded("FT202.tie"))
+    _count(answer, pairs=len(case.pairs(alike=False)), pairs_listed=listed)
+    raise UndecidedError("ties on more than a surface")
+    yield
+
+
 def conflicting_pairs(case: Case) -> set[tuple[int, int]]:
     """Return the pairs of rules that say different things of one output."""
     pairs = case.pairs(alike=False)
@@ -548,6 +556,7 @@ CLAIMS: dict[str, Callable[[Case, Answer], Statements]] = {
     "FT107.silent": never_fires,
     "FT201.never": apart,
     "FT201.unlisted": apart,
+    "FT202.others": ties,
     "FT204.alike": one_class,
     "FT301.fires": fires,
     "FT301.reaches": covers,
@@ -576,7 +585,7 @@ BOUNDS: dict[str, Callable[[Case, Answer], Statements]] = {
 
 PROVABLE = (
     *CLAIMS,
-    *("FT107.more", "FT202.others", "FT203.leaves", "FT402.outside", "FT402.peaks"),
+    *("FT107.more", "FT203.leaves", "FT402.outside", "FT402.peaks"),
     *("FT403.equal", "FT403.within", "FT403.similar"),
 )
 """The messages of answers that must be PROVED, but for those that may be open."""

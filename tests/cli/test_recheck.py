@@ -72,6 +72,21 @@ def test_a_file_that_is_not_there_is_one_sentence(call: Call) -> None:
     assert (code, out, err) == (2, "", "none.json: No such file or directory\n")
 
 
+def test_a_solver_that_is_missing_is_one_sentence(
+    call: Call, audit: dict[str, object]
+) -> None:
+    code, out, err = call("recheck", "audit.json", "grip.yaml", "--solver", "no/such")
+    assert (code, out, err) == (2, "", "no/such: no such program\n")
+
+
+def test_what_is_proved_is_written_for_solvers(call: Call) -> None:
+    assert call("export", "grip.yaml", "-o", "grip.smt2")[0] == 0
+    call("audit", "rules.yaml", "--smt", "claims.smt2", "--select", "FT201,FT301")
+    model, claims = (Path(f"{n}.smt2").read_text("utf-8") for n in ("grip", "claims"))
+    assert "(define-fun |rule 1| () Real ; if " in model
+    assert claims.count("(check-sat)") > 0
+
+
 def test_the_module_is_the_same_program(call: Call, audit: dict[str, object]) -> None:
     ran = subprocess.run(
         [sys.executable, "-m", "fuzzytree.rechecking", "audit.json", "grip.yaml"],
