@@ -17,6 +17,7 @@ from fuzzytree.rechecking.claims import (
     bound_statements,
     conflicting_pairs,
     no_more_gaps,
+    size,
     statements,
     without,
 )
@@ -453,6 +454,8 @@ def _state(case: Case, report: Report, answer: Answer) -> list[Statement]:
         return statements(case, answer)
     if isinstance(state, Computed):
         require(bool(state.how), f"it is {kind}, without how")
+        if answer.code == "FT501":
+            size(case, answer)
         report.counts["answers COMPUTED, not decided again"] += 1
         return []
     if isinstance(state, Declined):
