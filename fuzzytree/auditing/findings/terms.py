@@ -46,9 +46,9 @@ from fuzzytree.auditing.findings.records import (
     TermName,
 )
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.rechecking.words import listed
 from fuzzytree.model import LR, Points, RuleBase, Shape, Term, Variable, questions
 from fuzzytree.numerics import exact_degree, outwards
+from fuzzytree.rechecking.words import listed
 
 
 class VariableRange(NamedTuple):
