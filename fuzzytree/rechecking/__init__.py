@@ -10,7 +10,7 @@ as SMT-LIB 2 and asks a solver, and says what was not confirmed. Exit 0: all hol
 something does not, and all of that is listed; 2: it could not be run, or no solver is
 at hand.
 
-Read it in this order: how files become records and models (`records`, `yaml`,
+Read it in this order: how files become records and models (`records`, `words`, `yaml`,
 `sentences_of_rules`, `models`); degrees (`curves`); the text for solvers (`smt`);
 what a check needs (`case`); what is claimed (`claims`), who decides it (`solvers`),
 all other checks (`checks`), and how they end (`outcomes`). `two_models` checks what
@@ -59,11 +59,22 @@ from fuzzytree.rechecking.sentences import (
 from fuzzytree.rechecking.smt import Script
 from fuzzytree.rechecking.solvers import ask, script_text
 from fuzzytree.rechecking.two_models import recheck_difference
+from fuzzytree.rechecking.words import (
+    DATE_UNIT,
+    MISSING,
+    is_plain,
+    listed,
+    stretch,
+    stretch_word,
+    value_word,
+)
 from fuzzytree.rechecking.yaml import MOST_BYTES
 
 __all__ = [
+    "DATE_UNIT",
     "LIMITS",
     "MESSAGES",
+    "MISSING",
     "CannotRunError",
     "Confirmation",
     "Report",
@@ -71,6 +82,8 @@ __all__ = [
     "confirm",
     "confirm_difference",
     "digest_of",
+    "is_plain",
+    "listed",
     "model_text",
     "names_in",
     "open_interval",
@@ -78,6 +91,9 @@ __all__ = [
     "recheck_difference",
     "recheck_files",
     "sentence_of",
+    "stretch",
+    "stretch_word",
+    "value_word",
 ]
 
 Asked = list[tuple[int, Answer, list[Statement]]]

@@ -14,7 +14,7 @@ from typing import Literal
 from msgspec.structs import replace
 
 from fuzzytree.model import Part, Value, Variable
-from fuzzytree.rechecking.words import stretch
+from fuzzytree.rechecking import stretch
 
 Origin = Literal["model", "data", "spreads", "curves", "unused", "limits"]
 """The origin of a side: the range in the model, the smallest and largest value of the

@@ -29,8 +29,7 @@ from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import FuzzyTree
-from fuzzytree.rechecking import open_interval
-from fuzzytree.rechecking.words import listed
+from fuzzytree.rechecking import listed, open_interval
 
 MOST_BOXES = 20_000
 """Boxes of all leaves together, beyond which a tree's regions are not looked at."""

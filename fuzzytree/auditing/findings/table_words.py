@@ -13,11 +13,11 @@ from fuzzytree.auditing.engine.states import Bracket, Coordinate, Span, Witness
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.columns import days_of, placer
 from fuzzytree.model import Variable
-from fuzzytree.rechecking.sentences import sentence_of
-from fuzzytree.rechecking.words import (
+from fuzzytree.rechecking import (
     DATE_UNIT,
     MISSING,
     is_plain,
+    sentence_of,
     stretch,
     stretch_word,
     value_word,

@@ -48,7 +48,7 @@ from fuzzytree.auditing.findings.records import (
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import LR, Points, RuleBase, Shape, Term, Variable, questions
 from fuzzytree.numerics import exact_degree, outwards
-from fuzzytree.rechecking.words import listed
+from fuzzytree.rechecking import listed
 
 
 class VariableRange(NamedTuple):
