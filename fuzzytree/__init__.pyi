@@ -16,6 +16,7 @@ from .api import needs as needs
 from .api import predict as predict
 from .api import read as read
 from .api import recheck as recheck
+from .api import require as require
 from .api import rules_from_tree as rules_from_tree
 from .api import run as run
 from .api import save as save

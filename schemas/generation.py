@@ -30,6 +30,8 @@ FILES: Final[Mapping[str, str]] = MappingProxyType(
         "diff.schema.json": "fuzzytree.auditing.diff.difference_records:Difference",
         "learn.schema.json": "fuzzytree.api.holdout:Summary",
         "needs.schema.json": "fuzzytree.benchmarking.savings:Footprint",
+        "require.schema.json": "fuzzytree.auditing.require.claims:Compliance",
+        "requirements.schema.json": "fuzzytree.auditing.require.files:RequirementsFile",
         "rulebase.schema.json": "fuzzytree.formats.yaml.layout:RuleBaseFile",
         "stability.schema.json": "fuzzytree.checking.stability.results:Stability",
         "system.schema.json": "fuzzytree.formats.yaml.layout:SystemFile",

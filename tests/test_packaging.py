@@ -170,9 +170,18 @@ def test_the_action_audits_and_compares_as_sarif(tmp_path: Path) -> None:
     assert not (tmp_path / "fuzzytree-sarif" / "diff.sarif").exists()
     more = {"fail-on": "never", "old": str(old), "sarif": "to/sarif"}
     _action(tmp_path, {"model": str(new), **more}, expected=1)
+    must = tmp_path / "must.yaml"
+    must.write_text("requirements:\n- that: class is never open\n")
+    _action(
+        tmp_path, {"model": str(new), **more, "requirements": str(must)}, expected=1
+    )
     wrong = _action(tmp_path, {"model": "none.yaml"}, expected=2)
     assert wrong.stderr == "none.yaml: cannot be read: no such file or directory\n"
-    for name, codes in (("audit", {"FT101"}), ("diff", {"FT801", "FT802"})):
+    for name, codes in (
+        ("audit", {"FT101"}),
+        ("diff", {"FT801", "FT802"}),
+        ("require", {"requirement"}),
+    ):
         path = tmp_path / "to" / "sarif" / f"{name}.sarif"
         [run] = json.loads(path.read_text("utf-8"))["runs"]
         assert codes <= {result["ruleId"] for result in run["results"]}

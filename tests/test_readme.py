@@ -21,7 +21,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / "README.md"
-PAGES = [README, *sorted((ROOT / "docs" / "tutorials").glob("*.md"))]
+PAGES = [
+    README,
+    *sorted((ROOT / "docs" / "tutorials").glob("*.md")),
+    ROOT / "docs" / "how-to" / "require.md",
+]
 MOST_LINES, MOST_OUTPUT = 200, 11
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
 PROGRAMS = {"fuzzytree": f"{sys.executable} -m fuzzytree", "python": sys.executable}

@@ -26,6 +26,7 @@ from .verbs import needs as needs
 from .verbs import predict as predict
 from .verbs import read as read
 from .verbs import recheck as recheck
+from .verbs import require as require
 from .verbs import rows_of as rows_of
 from .verbs import rules_from_tree as rules_from_tree
 from .verbs import save as save

@@ -773,6 +773,59 @@ def diff(
     )
 
 
+def require(
+    model: ModelSource,
+    requirements: str | os.PathLike[str] | Sequence[str] | None = None,
+    *,
+    that: Sequence[str] = (),
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    steps: int | None = None,
+    allow_loss: bool = False,
+) -> auditing.Compliance:
+    """Prove or refute what a model must do.
+
+    Args:
+        model: A tree, a rule base or a fuzzy system, or the path of one.
+        requirements: The path of a YAML file of requirements, or a list of sentences.
+        that: More sentences, such as `class is never firm where force < 2`.
+        limits: The ends of inputs, which go before the ranges of the model.
+        steps: The budget of each question, in steps of about a microsecond.
+        allow_loss: As in `load`.
+
+    Raises:
+        ReadError: If a file cannot be read.
+        LossError: As `load`.
+        ValueError: If a sentence states no requirement, or no row meets its
+            conditions.
+
+    Example:
+        >>> from fuzzytree.testing import random_system
+        >>> system = random_system(1)
+        >>> result = require(system, [f"{system.outputs[0].name} is at least 2"])
+        >>> len(result.answers)
+        1
+    """
+    document, file = _model_and_file(model, allow_loss)
+    known: list[auditing.Requirement] = []
+    source = ""
+    if isinstance(requirements, str | os.PathLike):
+        source = os.fspath(requirements)
+        known += auditing.read_requirements(source, document)
+    elif requirements is not None:
+        that = (*requirements, *that)
+    known += [auditing.parse_requirement(text, document) for text in that]
+    names = limits or {}
+    domain = auditing.domain_of(document, limited=names)
+    return auditing.comply(
+        document,
+        known,
+        auditing.limited(domain, names, document),
+        steps=auditing.STEPS if steps is None else steps,
+        title=str(file.name) if file else "",
+        source=source,
+    )
+
+
 def needs(
     model: ModelSource,
     *,

@@ -26,7 +26,7 @@ from fuzzytree.model import noticed, version, watched
 
 _OWN = (
     *("learn", "collect", "show", "export", "convert", "run", "check", "audit"),
-    *("diff", "explain", "recheck", "bench", "needs", "stability"),
+    *("require", "diff", "explain", "recheck", "bench", "needs", "stability"),
 )
 VERBS: Mapping[str, str] = MappingProxyType(
     {

@@ -28,6 +28,10 @@ from .pictures import SUFFIXES as SUFFIXES
 from .pictures import Picture as Picture
 from .pictures import check_suffix as check_suffix
 from .pictures import picture as picture
+from .require import compliance_annotations as compliance_annotations
+from .require import compliance_lines as compliance_lines
+from .require import compliance_sarif as compliance_sarif
+from .require import compliance_verdict as compliance_verdict
 from .sarif import annotation_lines as annotation_lines
 from .sarif import sarif_text as sarif_text
 from .stability import stability_lines as stability_lines

@@ -58,7 +58,7 @@ def sarif_text(audit: Audit, baseline: Mapping[str, str] | None = None) -> str:
         ],
         "artifacts": [
             {
-                "location": {"uri": _uri(source.name)},
+                "location": {"uri": uri(source.name)},
                 "hashes": {"sha-256": source.sha256},
             }
             for source in (audit.file, audit.data)
@@ -149,13 +149,13 @@ def _locations(
     """Yield places; without one, the file that was audited."""
     for place in places:
         spot = {"startLine": place.line, "startColumn": place.column}
-        where = {"artifactLocation": {"uri": _uri(place.file)}, "region": spot}
+        where = {"artifactLocation": {"uri": uri(place.file)}, "region": spot}
         yield {"physicalLocation": where}
     if not places and audit is not None and audit.file is not None:
-        yield {"physicalLocation": {"artifactLocation": {"uri": _uri(audit.file.name)}}}
+        yield {"physicalLocation": {"artifactLocation": {"uri": uri(audit.file.name)}}}
 
 
-def _uri(path: str) -> str:
+def uri(path: str) -> str:
     """Return a path as the reference that it is in a repository."""
     return quote(path, safe="/")
 
@@ -195,12 +195,17 @@ def _annotation(answer: AuditAnswer, audit: Audit) -> str:
         properties = {"file": audit.file.name}
     title = CODES[answer.code].title if answer.code in CODES else ""
     properties["title"] = f"{answer.code} {title}".strip()
+    said = f"{answer.sentence} ({state_word(answer.state)}, {answer.id})"
+    return workflow_command(_COMMANDS[answer.severity], properties, said)
+
+
+def workflow_command(command: str, properties: Mapping[str, object], text: str) -> str:
+    """Return a command of GitHub Actions that annotates a line of a file."""
     shown = ",".join(
         f"{name}={_escaped(str(value), _IN_PROPERTIES)}"
         for name, value in properties.items()
     )
-    said = f"{answer.sentence} ({state_word(answer.state)}, {answer.id})"
-    return f"::{_COMMANDS[answer.severity]} {shown}::{_escaped(said, _IN_TEXT)}"
+    return f"::{command} {shown}::{_escaped(text, _IN_TEXT)}"
 
 
 def _escaped(text: str, escapes: Mapping[str, str]) -> str:

@@ -34,6 +34,9 @@ FIRST_LINES = {
     "check wine.yaml bad.yaml": "wine: 2 of 81 comparisons disagree (238 ",
     "audit wine.yaml": "nothing found; 56 questions, ",
     "audit wine.yaml --data t.csv --target cultivar": "1 finding: 1 note; ",
+    "require wine.yaml --that every__input__gets__a__class": (
+        "wine.yaml: 1 requirement: 1 proved"
+    ),
     "diff wine.yaml bad.yaml": "decisions have changed; ",
     "explain": "32 codes; `fuzzytree explain CODE` explains one",
     "explain FT203": "FT203 tree and raw rules differ (warning",
@@ -81,7 +84,7 @@ def test_a_verb_prints_its_conclusion_first_and_at_most_a_screen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(wine)
-    main(command.split())
+    main([word.replace("__", " ") for word in command.split()])
     out, err = capsys.readouterr()
     lines = [*out.splitlines(), *err.splitlines()]
     assert len(lines) <= SCREEN, "\n".join(lines)

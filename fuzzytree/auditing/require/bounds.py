@@ -1,0 +1,112 @@
+"""Bounds of numbers on many boxes at once, rounded outwards; of averages and slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fuzzytree.model import FloatArray
+
+_UNIT = 2.0**-52
+
+
+class Bounds(NamedTuple):
+    """The least and the largest value, of shape (boxes,) or (summands, boxes)."""
+
+    low: FloatArray
+    high: FloatArray
+
+    def __neg__(self) -> Bounds:
+        return Bounds(-self.high, -self.low)
+
+    def plus(self, other: Bounds) -> Bounds:
+        """Return bounds of the sum."""
+        return _rounded(self.low + other.low, self.high + other.high)
+
+    def times(self, other: Bounds) -> Bounds:
+        """Return bounds of the product, where 0 times infinity is 0."""
+        products = [a * b for a in self for b in other]
+        products = [np.where(np.isnan(product), 0.0, product) for product in products]
+        return _rounded(np.minimum.reduce(products), np.maximum.reduce(products))
+
+    def over(self, divisor: Bounds) -> Bounds:
+        """Return bounds of the quotient by something that is never negative."""
+        return self.times(_rounded(1.0 / divisor.high, 1.0 / divisor.low))
+
+    def total(self) -> Bounds:
+        """Return bounds of the sum over all summands."""
+        slack = len(self.low) * _UNIT
+        low = self.low.sum(0) - slack * np.abs(self.low).sum(0)
+        return _rounded(low, self.high.sum(0) + slack * np.abs(self.high).sum(0))
+
+
+def _rounded(low: FloatArray, high: FloatArray) -> Bounds:
+    """Return bounds moved outwards; of what is not known, infinite ones."""
+    low, high = low - _UNIT * np.abs(low), high + _UNIT * np.abs(high)
+    return Bounds(
+        np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
+    )
+
+
+def exact(values: FloatArray) -> Bounds:
+    """Return bounds of numbers that are known."""
+    return Bounds(values, values)
+
+
+def stacked(parts: Sequence[Bounds]) -> Bounds:
+    """Return bounds of several numbers as summands."""
+    return Bounds(*map(np.array, zip(*parts, strict=True)))
+
+
+def average(values: Bounds, weights: Bounds) -> Bounds:
+    """Return bounds of an average; infinite ones, low above high, without any weight.
+
+    The least average gives small values their largest weights and large values their
+    least: it is the least over all ways to part the sorted values in two.
+
+    Example:
+        >>> values = exact(np.array([[0.0], [10.0]]))
+        >>> weights = Bounds(np.array([[0.5], [0.25]]), np.array([[0.5], [0.5]]))
+        >>> [round(float(end[0]), 3) for end in average(values, weights)]
+        [3.333, 5.0]
+    """
+    least, most = (_least_average(x, weights) for x in (values.low, -values.high))
+    return Bounds(least, -most)
+
+
+def _least_average(values: FloatArray, weights: Bounds) -> FloatArray:
+    values = np.broadcast_to(values, weights.low.shape)
+    order = np.argsort(values, axis=0, kind="stable")
+    x, low, high = (np.take_along_axis(one, order, 0) for one in (values, *weights))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sums = _parted(high, low)
+        averages = np.where(sums > 0.0, _parted(x * high, x * low) / sums, np.inf)
+    slack = 2 * (len(values) + 4) * _UNIT * np.abs(values).max(0)
+    return np.array(averages.min(0) - slack)
+
+
+def _parted(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the sums of the first entries up to each, and of the second behind it."""
+    rest = np.zeros_like(second)
+    rest[:-1] = second[:0:-1].cumsum(0)[::-1]
+    return np.array(first.cumsum(0) + rest)
+
+
+def largest(
+    values: Sequence[Bounds], slopes: Sequence[Bounds]
+) -> tuple[Bounds, Bounds]:
+    """Return bounds of the largest of some numbers, and of its slope.
+
+    Its slope is that of a number that may be larger than all others, or of the one
+    that is surely as large as the rest.
+    """
+    (lows, highs), (falls, rises) = stacked(values), stacked(slopes)
+    low = lows.max(0)
+    may_be = highs > low
+    np.put_along_axis(may_be, lows.argmax(0)[None], values=True, axis=0)
+    slope = Bounds(
+        np.where(may_be, falls, np.inf).min(0), np.where(may_be, rises, -np.inf).max(0)
+    )
+    return Bounds(low, highs.max(0)), slope
