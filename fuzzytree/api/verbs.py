@@ -778,7 +778,7 @@ def require(
     requirements: str | os.PathLike[str] | Sequence[str] | None = None,
     *,
     that: Sequence[str] = (),
-    limits: Mapping[str, tuple[float, float]] | None = None,
+    limits: auditing.Limits | None = None,
     steps: int | None = None,
     allow_loss: bool = False,
 ) -> auditing.Compliance:

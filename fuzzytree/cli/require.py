@@ -38,7 +38,8 @@ class RequireOptions(ResultOptions):
     file: str | None = argument("[FILE]", required=False)
     that: tuple[str, ...] = several("--that TEXT", "Requirement to check (repeat).")
     limits: tuple[str, ...] = several(
-        "--limits NAME=LOW:HIGH", "Range of values that an input can have (repeat)."
+        "--limits NAME=LOW:HIGH",
+        "Range, or NAME=CATEGORY,..., of an input that rows can have (repeat).",
     )
     steps: int | None = option(
         "--steps NUMBER",

@@ -11,6 +11,7 @@ import re
 from collections.abc import Collection, Iterable
 from typing import Final
 
+from fuzzytree.auditing.findings.table_words import read_value
 from fuzzytree.auditing.require.claims import (
     Claim,
     ClassClaim,
@@ -22,8 +23,7 @@ from fuzzytree.auditing.require.claims import (
     UnchangedClaim,
 )
 from fuzzytree.cells import number_of
-from fuzzytree.columns import days_of
-from fuzzytree.model import DATE_UNIT, Document, FuzzySystem, Variable, name_choice
+from fuzzytree.model import Document, FuzzySystem, Variable, name_choice
 
 _MOST_BOXES = 256
 _CONDITION = re.compile(
@@ -141,7 +141,7 @@ def _add_conditions(text: str, spans: dict[str, _Spans], model: Document) -> Non
 def _condition(match: re.Match[str], variable: Variable) -> _Spans:
     """Return the values that meet a condition, with the doubles next to open ends."""
     if match["values"] is not None:
-        values = [_value(text, variable) for text in _names(match["values"])]
+        values = [read_value(variable, text) for text in _names(match["values"])]
         return tuple((value, value) for value in values)
     if variable.categories:
         raise ValueError(
@@ -149,11 +149,11 @@ def _condition(match: re.Match[str], variable: Variable) -> _Spans:
             f"'{variable.name} is {variable.categories[0]}'"
         )
     if match["sign"] is None:
-        low, high = (_value(match[end], variable) for end in ("low", "high"))
+        low, high = (read_value(variable, match[end]) for end in ("low", "high"))
         if low > high:
             raise ValueError(_swapped(match))
         return ((low, high),)
-    end, sign = _value(match["end"], variable), match["sign"]
+    end, sign = read_value(variable, match["end"]), match["sign"]
     if sign[0] == "<":
         return ((-math.inf, end if sign == "<=" else math.nextafter(end, -math.inf)),)
     return ((end if sign == ">=" else math.nextafter(end, math.inf), math.inf),)
@@ -162,18 +162,6 @@ def _condition(match: re.Match[str], variable: Variable) -> _Spans:
 def _swapped(match: re.Match[str]) -> str:
     ends = f"the ends {match['low']} and {match['high']} are swapped"
     return f"{ends}; the smaller one stands first"
-
-
-def _value(text: str, variable: Variable) -> float:
-    """Return a value in the words of a table: a category, a date or a number."""
-    text = _plain(text)
-    if variable.categories:
-        _choose(text, f"category of {variable.name!r}", variable.categories)
-        return float(variable.categories.index(text))
-    value = days_of(text) if variable.unit == DATE_UNIT else None
-    if value is None:
-        value = {"true": 1.0, "false": 0.0}.get(text.lower())
-    return _number(text) if value is None else value
 
 
 def _number(text: str) -> float:
