@@ -13,7 +13,7 @@ at hand.
 Read it in this order: how files become records and models (`records`, `words`, `yaml`,
 `sentences_of_rules`, `models`); degrees (`curves`); the text for solvers (`smt`);
 what a check needs (`case`); what is claimed (`claims`), who decides it (`solvers`),
-all other checks (`checks`), and how they end (`outcomes`). `two_models` checks what
+all other checks (`witnesses`, `checks`), and how they end (`outcomes`). `two_models` checks what
 `diff` says; `sentences` are those of an audit.
 """
 

@@ -8,17 +8,8 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property
 
-from fuzzytree.rechecking.curves import Between, bounds, is_straight, knots
-from fuzzytree.rechecking.models import (
-    ONE,
-    ZERO,
-    Model,
-    Point,
-    Proposition,
-    Rule,
-    Rules,
-    Variable,
-)
+from fuzzytree.rechecking.curves import ONE, ZERO, Between, bounds, is_straight, knots
+from fuzzytree.rechecking.models import Model, Point, Proposition, Rule, Rules, Variable
 from fuzzytree.rechecking.outcomes import (
     DoesNotHoldError,
     Report,

@@ -14,8 +14,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.rechecking.case import Case
-from fuzzytree.rechecking.curves import bounds, is_straight, knots
-from fuzzytree.rechecking.models import ZERO, Curve, Rule, Variable
+from fuzzytree.rechecking.curves import ZERO, Curve, bounds, is_straight, knots
+from fuzzytree.rechecking.models import Rule, Variable
 from fuzzytree.rechecking.outcomes import UndecidedError, require
 from fuzzytree.rechecking.records import Answer, Proved
 from fuzzytree.rechecking.smt import all_of, any_of

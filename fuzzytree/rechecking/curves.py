@@ -1,4 +1,4 @@
-"""Degrees of membership functions: between which fractions they lie on an interval.
+"""Membership functions: read from a file, and between which fractions degrees lie.
 
 Straight pieces are exact. Everything else is enclosed; both ends are rounded outwards,
 to 40 decimal digits, so they are certain.
@@ -13,16 +13,27 @@ from bisect import bisect_left
 from collections.abc import Callable
 from decimal import Context, Decimal
 from fractions import Fraction
+from typing import Any, NamedTuple
 
-from fuzzytree.rechecking.models import ONE, ZERO, Curve
-from fuzzytree.rechecking.outcomes import UndecidedError
+from fuzzytree.rechecking.outcomes import CannotRunError, UndecidedError
 
+ZERO, ONE = Fraction(0), Fraction(1)
+Facts = dict[str, Any]
 Between = tuple[Fraction, Fraction]
 STRAIGHT = ("band", "points", "trapezoid")
 CAP = 1 - Fraction(1, 2**53)  # the largest degree off a plateau
 _DIGITS = Context(prec=40)
 _PI = Fraction(31415926535897932384626433832795028841971693993751, 10**49)
 _FAR = 1000  # e**-1000 and less is enclosed by 0 and that
+
+
+class Curve(NamedTuple):
+    """A membership function: its kind and numbers, its height, and hedges."""
+
+    kind: str
+    numbers: tuple[Any, ...]
+    height: Fraction = ONE
+    hedges: tuple[str, ...] = ()
 
 
 def is_straight(curve: Curve) -> bool:
@@ -367,3 +378,123 @@ def _hedged(hedge: str, one: Between) -> Between:
         return 1 - one[1], 1 - one[0]
     low, high = (min(max(end, ZERO), ONE) for end in one)
     return _HEDGES[hedge](low)[0], _HEDGES[hedge](high)[1]
+
+
+# --- from a file
+
+SHAPES = {
+    "gaussian": "mean, deviation",
+    "two gaussians": "left, left deviation, right, right deviation",
+    "bell": "center, width, slope",
+    "sigmoid": "inflection, slope",
+    "s": "start, end",
+    "cosine": "center, width",
+    "concave": "inflection, end",
+    "spike": "center, width",
+    "arc": "start, end",
+    "semi ellipse": "start, end",
+}
+"""The curves whose numbers have names, and these names in order."""
+
+
+def keys(one: Facts, needed: str, optional: str = "") -> None:
+    """Refuse facts that lack a key, or have another one.
+
+    Raises:
+        CannotRunError: If they do.
+    """
+    must = {*needed.split(", ")}
+    wrong = sorted(must - one.keys() | one.keys() - must - {*optional.split(", ")})
+    if wrong:
+        raise CannotRunError(f"missing or unknown: {', '.join(map(repr, wrong)):.200}")
+
+
+def number_of(value: Any) -> float:
+    """Return a finite number.
+
+    Raises:
+        CannotRunError: If it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise CannotRunError(f"no number: {value!r:.60}")
+    if not math.isfinite(value):
+        raise CannotRunError(f"not finite: {value!r:.60}")
+    return float(value)
+
+
+def curve_of(one: Facts) -> Curve:
+    """Return the membership function of a term.
+
+    Raises:
+        CannotRunError: If it is not known here.
+    """
+    height = Fraction(number_of(one.pop("height", 1)))
+    if one == {"degree": 1}:
+        return Curve("band", (None,) * 4, height)
+    if "mean" in one and one.keys() & {"spread", "left"}:
+        keys(
+            one, "mean, left, right" if "left" in one else "mean, spread, curve, reach"
+        )
+        sides = []
+        for side in (one.get("left", one), one.get("right", one)):
+            spread, reach = number_of(side["spread"]), number_of(side["reach"])
+            if spread <= 0 or reach <= 1 or not 1 <= len(side["curve"]) <= 8:
+                raise CannotRunError("a side of no set")
+            sides.append((spread, tuple(map(number_of, side["curve"])), reach))
+        return Curve("lr", (number_of(one["mean"]), *sides), height)
+    if one and one.keys() <= {"0 up to", "above", "up to", "0 from"}:
+        names = ("above", "up to", "0 up to", "0 from")
+        ends = tuple(None if n not in one else number_of(one[n]) for n in names)
+        order = [end for end in (ends[2], ends[0], ends[1], ends[3]) if end is not None]
+        if order != sorted({*order}):
+            raise CannotRunError("a plateau whose ends are swapped")
+        return Curve("band", ends, height)
+    ((kind, data),) = one.items()
+    if kind == "formula":
+        return Curve(kind, (str(data),), height)
+    return Curve(*_numbers(kind, data), height)
+
+
+def _numbers(kind: str, data: Any) -> tuple[str, tuple[Any, ...]]:
+    if kind == "points":
+        values, degrees = zip(*data, strict=True)
+        points = tuple(map(number_of, values)), tuple(map(number_of, degrees))
+        if [*points[0]] != sorted(points[0]) or not all(0 <= y <= 1 for y in points[1]):
+            raise CannotRunError("points that are no function")
+        return kind, points
+    if kind in SHAPES:
+        keys(data, SHAPES[kind])
+        numbers = tuple(number_of(data[name]) for name in SHAPES[kind].split(", "))
+        is_wide = all(
+            numbers[i] > 0
+            for i, n in enumerate(SHAPES[kind].split(", "))
+            if n in ("width",) or n.endswith("deviation")
+        )
+        if not is_wide:
+            raise CannotRunError("a curve without width")
+        return kind, numbers
+    if kind in ("trapezoid", "triangle"):
+        a, *inner, d = data
+        b, c = map(number_of, inner if kind == "trapezoid" else inner * 2)
+        ends = (
+            None if a == -math.inf else number_of(a),
+            b,
+            c,
+            None if d == math.inf else number_of(d),
+        )
+        order = [end for end in ends if end is not None]
+        if order != sorted(order):
+            raise CannotRunError("a trapezoid whose ends are swapped")
+        return "trapezoid", ends
+    if kind in ("sigmoid difference", "sigmoid product"):
+        first, second = data
+        return kind, (_numbers("sigmoid", first)[1], _numbers("sigmoid", second)[1])
+    if kind == "pi":
+        a, b, c, d = map(number_of, data)
+        return kind, (a, b, c, d)
+    if kind not in ("singleton", "at least", "at most"):
+        raise CannotRunError(f"a curve ({kind:.60}) is not known")
+    x = number_of(data)
+    if kind == "singleton":
+        return "trapezoid", (x, x, x, x)
+    return "trapezoid", (x, x, x, None) if kind == "at least" else (None, x, x, x)

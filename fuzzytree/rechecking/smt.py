@@ -20,17 +20,8 @@ from fractions import Fraction
 from types import MappingProxyType
 from typing import NamedTuple
 
-from fuzzytree.rechecking.curves import bounds, is_straight, knots
-from fuzzytree.rechecking.models import (
-    ONE,
-    ZERO,
-    Curve,
-    Model,
-    Proposition,
-    Rule,
-    Rules,
-    Variable,
-)
+from fuzzytree.rechecking.curves import ONE, ZERO, Curve, bounds, is_straight, knots
+from fuzzytree.rechecking.models import Model, Proposition, Rule, Rules, Variable
 
 Ends = tuple[Fraction, Fraction]
 CELLS, PARTS = 24, 8

@@ -19,7 +19,8 @@ from fuzzytree.rechecking.checks import (
     judge,
 )
 from fuzzytree.rechecking.claims import Statement
-from fuzzytree.rechecking.models import Facts, Model
+from fuzzytree.rechecking.curves import Facts
+from fuzzytree.rechecking.models import Model
 from fuzzytree.rechecking.outcomes import Report, UndecidedError, require
 from fuzzytree.rechecking.records import (
     Answer,
