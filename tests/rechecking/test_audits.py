@@ -7,6 +7,7 @@ import random
 import re
 from collections import defaultdict
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -220,6 +221,25 @@ def test_a_removed_finding_is_reported() -> None:
     answers.remove(one)
     wrong = "answer 13 (FT104, pairs of rules): whether others are listed"
     assert changed(answers=answers) == [wrong]
+
+
+@pytest.mark.parametrize("code", ["FT101", "FT103", "FT106", "FT107", "FT201", "FT301"])
+def test_an_audit_without_one_of_its_answers_is_reported(code: str) -> None:
+    content = Path("examples/grip.yaml").read_bytes()
+    material = Material(load("examples/grip.yaml"), model_file("grip.yaml", content))
+    text = audit(material, selection=AuditSelection(skip=["FT6"])).to_json()
+    answers = json.loads(text)["answers"]
+    places = [n for n, one in enumerate(answers) if one["code"] == code]
+    assert places
+    for place in [*places, *([places] if code in ("FT201", "FT301") else [])]:
+        gone = place if isinstance(place, list) else [place]
+        rest = [one for n, one in enumerate(answers) if n not in gone]
+        gaps = [one for one in rest if one["message"].startswith("FT301.gap")]
+        for number, one in enumerate(gaps, 1):
+            one["subject"] = f"gap {number}"
+        facts = json.loads(text) | {"answers": rest}
+        facts["digest"] = digest_of(facts)
+        assert wrong_with(facts, content), answers[gone[0]]["sentence"]
 
 
 def test_a_finding_without_a_cause_is_reported() -> None:
