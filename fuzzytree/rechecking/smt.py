@@ -155,7 +155,7 @@ class Script:
         self.is_exact, self.is_product = True, False
         self._lines: list[str] = []
         self._constants: dict[str, str] = {}
-        self._symbols: dict[str, str] = {}
+        self._symbols: dict[tuple[str, str], str] = {}
         self._terms: dict[tuple[str, str, str], str] = {}
         self._unknowns: dict[tuple[str, Curve], str] = {}
         self._ends: dict[str, Ends] = {}
@@ -203,25 +203,25 @@ class Script:
                 text = f"|{short}|"
         return f"(- {text})" if value < 0 else text
 
-    def symbol(self, name: str) -> str:
-        """Return a name as a symbol, another one for each name."""
-        if name not in self._symbols:
+    def symbol(self, name: str, kind: str = "rule") -> str:
+        """Return a name as a symbol, another one for each name and kind of thing."""
+        if (kind, name) not in self._symbols:
             text = "".join("!" if c in "|\\" or ord(c) < 32 else c for c in name)
             while _RESERVED.fullmatch(text) or f"|{text}|" in self._symbols.values():
                 text += "'"
-            self._symbols[name] = f"|{text}|"
-        return self._symbols[name]
+            self._symbols[kind, name] = f"|{text}|"
+        return self._symbols[kind, name]
 
     # --- variables
 
     def _add_variable(self, one: Variable, of: str) -> None:
-        if not one.parts and one.name in self._symbols:
+        if not one.parts and ("input", one.name) in self._symbols:
             return  # of two models
         own = self.value(one, of)
         if one.parts:
             parts = (
-                f"(* {self.number(w)} (- {self.symbol(name)} {self.number(c)}))"
-                for name, w, c in one.parts
+                f"(* {self.number(w)} (- {self.symbol(n, 'input')} {self.number(c)}))"
+                for n, w, c in one.parts
             )
             self._lines.append(f"(define-fun {own} () Real (+ 0.0 {' '.join(parts)}))")
         else:
@@ -231,7 +231,7 @@ class Script:
 
     def value(self, one: Variable, of: str = "") -> str:
         """Return the symbol of a variable's value."""
-        return self.symbol(f"{of}{one.name}" if one.parts else one.name)
+        return self.symbol(f"{of}{one.name}" if one.parts else one.name, "input")
 
     def _assert_values(self, one: Variable, own: str) -> None:
         """Assert the values that an input can have."""
@@ -368,7 +368,9 @@ class Script:
         return {name: self.strength(part, rules, of) for name, part in own.items()}
 
     def add_rule(self, name: str, rule: Rule, rules: Rules, of: str = "") -> str:
-        """Add a function that is the strength of a rule, and return it."""
+        """Add a function that is the strength of a rule, once, and return it."""
+        if ("rule", name) in self._symbols:
+            return self.symbol(name)
         own, text = self.symbol(name), self.strength(rule, rules, of)
         when = " and ".join(map(str, rule.when)).replace("\0", " ") or "anything"
         self._lines += [
@@ -403,11 +405,12 @@ class Script:
                 formulas.append(f"(= {degree} {self.number(level)})")
                 continue
             name = f"{of}{variable.name} is {_words(term)}: {level} around"
-            if name not in self._symbols:
+            if ("zero", name) not in self._symbols:
                 flat = any_of(self._flat(_straight(curve), level))
-                head = f"(define-fun {self.symbol(name)} ((x Real)) Bool"
+                head = f"(define-fun {self.symbol(name, 'zero')} ((x Real)) Bool"
                 self._lines.append(f"{head} {flat})")
-            formulas.append(f"({self.symbol(name)} {self.value(variable, of)})")
+            around = self.symbol(name, "zero")
+            formulas.append(f"({around} {self.value(variable, of)})")
         return any_of(formulas) if one.negated else all_of(formulas)
 
     def _flat(self, function: Lines, level: Fraction) -> Iterator[str]:
