@@ -107,7 +107,8 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> tuple[Line, Line]:
     """Return lines below and above a curve on an interval."""
     whole = bounds(curve, low, high)
     if whole[0] == whole[1]:
-        return (Line(low, whole[0], ZERO),) * 2
+        line = Line(low, whole[0], ZERO)
+        return line, line
     p, q = (_rounded(bounds(curve, x, x)[0]) for x in (low, high))
     line = Line(low, p, (q - p) / (high - low))
     under = over = ZERO
