@@ -96,7 +96,7 @@ __all__ = [
     "value_word",
 ]
 
-Asked = list[tuple[int, Answer, list[Statement]]]
+Questions = list[tuple[int, Answer, list[Statement]]]
 """The number of each answer that a solver must decide, and its claims."""
 
 
@@ -117,32 +117,34 @@ def recheck(
     facts, result, case = _read(audit, model, names)
     report = Report(UNCHECKED)
     report.codes = [one.code for one in case.answers]
-    asked: Asked = []
+    questions: Questions = []
     try:
         check_files(case, report, facts, model, names[1])
         check_head(result, case, report)
         for number, answer in enumerate(case.answers, 1):
-            asked.append((number, answer, check_answer(case, report, answer, number)))
+            questions.append(
+                (number, answer, check_answer(case, report, answer, number))
+            )
         gaps = check_gaps(result, case)
         if gaps is not None:
-            asked.append((case.answers.index(gaps[0]) + 1, *gaps))
+            questions.append((case.answers.index(gaps[0]) + 1, *gaps))
     except (DoesNotHoldError, UndecidedError) as error:
         report.wrong.append(str(error))
     except (LookupError, TypeError, ValueError):
         report.wrong.append("an answer names what there is not")
-    _decide(case, report, asked, solver)
+    _decide(case, report, questions, solver)
     return report
 
 
-def _decide(case: Case, report: Report, asked: Asked, solver: str) -> None:
+def _decide(case: Case, report: Report, questions: Questions, solver: str) -> None:
     """Ask a solver for all claims, and note which answers it confirms."""
-    asked = [one for one in asked if one[2]]
-    every = [claim for *_, claims in asked for claim in claims]
+    questions = [one for one in questions if one[2]]
+    every = [claim for *_, claims in questions for claim in claims]
     if not every and not solver:
         return
     results = ask(case.script.text(), every, solver)
     answers = iter(results.answers)
-    for number, answer, claims in asked:
+    for number, answer, claims in questions:
         pairs = [(claim, next(answers)) for claim in claims]
         is_proof = isinstance(answer.state, Proved)
         if not results.solver:
@@ -177,8 +179,8 @@ def confirm(audit: bytes, model: bytes) -> Confirmation:
     Raises:
         CannotRunError: If the model cannot be read, or the solver fails.
     """
-    case, asked, report = _claims(audit, model)
-    _decide(case, report, asked, "")
+    case, questions, report = _claims(audit, model)
+    _decide(case, report, questions, "")
     return _confirmation(report)
 
 
@@ -188,10 +190,10 @@ def claims_text(audit: bytes, model: bytes) -> str:
     Raises:
         CannotRunError: If the model cannot be read.
     """
-    case, asked, _ = _claims(audit, model)
+    case, questions, _ = _claims(audit, model)
     every = [
         claim._replace(text=f"{answer.code}: {claim.text}")
-        for _, answer, claims in asked
+        for _, answer, claims in questions
         for claim in claims
     ]
     return script_text(case.script.text(), every)
@@ -234,14 +236,16 @@ def model_text(model: bytes) -> str:
     return script.text()
 
 
-def _claims(audit: bytes, model: bytes) -> tuple[Case, Asked, Report]:
+def _claims(audit: bytes, model: bytes) -> tuple[Case, Questions, Report]:
     """Return the claims of all PROVED answers."""
     _, _, case = _read(audit, model, ("the audit", "model.yaml"))
-    report, asked = Report(), Asked()
+    report, questions = Report(), Questions()
     for number, answer in enumerate(case.answers, 1):
         if isinstance(answer.state, Proved):
-            asked.append((number, answer, check_answer(case, report, answer, number)))
-    return case, asked, report
+            questions.append(
+                (number, answer, check_answer(case, report, answer, number))
+            )
+    return case, questions, report
 
 
 def _confirmation(report: Report) -> Confirmation:

@@ -55,8 +55,8 @@ def statements(case: Case, answer: Answer) -> list[Statement]:
     """
     if answer.message not in CLAIMS:
         raise UndecidedError("no solver of lines and polynomials is asked for it")
-    made = CLAIMS[answer.message](case, answer)
-    result = [*itertools.islice(made, _MOST + 1)]
+    every = CLAIMS[answer.message](case, answer)
+    result = [*itertools.islice(every, _MOST + 1)]
     if len(result) > _MOST:
         raise UndecidedError(f"more than {_MOST:,} claims")
     return result

@@ -241,6 +241,17 @@ def test_a_program_that_fails_is_one_sentence(
     assert str(caught.value).endswith(what)
 
 
+def test_a_program_that_does_not_end_is_stopped(
+    monkeypatch: pytest.MonkeyPatch, program: Program
+) -> None:
+    monkeypatch.setattr("fuzzytree.rechecking.solvers.MOST_SECONDS", 0.2)
+    result, content = audited(grip())
+    path = program("import time; time.sleep(60)")
+    with pytest.raises(CannotRunError) as caught:
+        recheck(msgspec.json.encode(result), content, NAMES, path)
+    assert str(caught.value).endswith("no answer in 0.2 s")
+
+
 def test_a_program_that_is_missing_is_one_sentence() -> None:
     result, content = audited(grip())
     with pytest.raises(CannotRunError, match=r"^no/such: no such program$"):
