@@ -10,10 +10,9 @@ from fuzzytree.rechecking.claims import without
 from fuzzytree.rechecking.curves import ZERO
 from fuzzytree.rechecking.outcomes import Report, require
 from fuzzytree.rechecking.records import Answer, Span, Witness, fraction
-
-CLOSE_LEVEL = Fraction(1, 10**9)
 from fuzzytree.rechecking.words import is_plain, stretch_word
 
+CLOSE_LEVEL = Fraction(1, 10**9)
 """How far a level of a witness may be rounded."""
 
 
