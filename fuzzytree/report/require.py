@@ -17,13 +17,12 @@ _INDENT = " " * 9
 
 
 def compliance_lines(compliance: Compliance) -> Iterator[str]:
-    """Yield the verdict on a model, then each requirement with its reason or rows."""
+    """Yield the verdict on a model, then each requirement, its reason and its rows."""
     yield compliance_verdict(compliance)
     for answer in compliance.answers:
         name = f"{answer.name}: " if answer.name else ""
-        text = printable(f"{name}{answer.requirement}")
+        text = f"{name}{answer.requirement} ({_reason(answer)})"
         yield from wrapped(text, WIDTH, f"{answer.verdict:8} ", _INDENT)
-        yield from wrapped(printable(_reason(answer)), WIDTH, _INDENT, _INDENT)
         if answer.rows:
             rows = answer.rows.rstrip("\n").split("\n")
             yield f"{_INDENT}{printable(rows[0])}"

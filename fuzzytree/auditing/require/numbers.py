@@ -16,7 +16,7 @@ from fuzzytree.model import BoolArray, FloatArray, FuzzySystem
 from fuzzytree.runtimes import run_system
 from fuzzytree.semantics import Status
 
-_WEAKER = tuple(2.0**-k for k in (10, 7, 5, 3, 1, 0))
+_WEAKER = tuple(2.0**k for k in (-10, -7, -5, -3, -1, 1, 4, 8))
 """The shares of an output's scale by which an open claim is weakened, in this order."""
 
 
@@ -37,7 +37,7 @@ def covered_outcome(search: Search) -> Outcome:
         if isinstance(gap, Point) and loss(search.row(gap.values))[0] > 0.0:
             return refuted._replace(rows=search.row(gap.values))
         if not isinstance(gap, Proved):
-            return Outcome("OPEN", f"{output.name!r}: {_why(gap)}")
+            return Outcome("OPEN", f"{output.name!r}: {_gap_text(gap)}")
     return Outcome("PROVED", "some rule fires everywhere")
 
 
@@ -67,7 +67,7 @@ def level_outcome(search: Search, claim: LevelClaim) -> Outcome:
         if isinstance(gap, Point) and loss(search.row(gap.values))[0] > 0.0:
             return refuted(search.row(gap.values))
         if not isinstance(gap, Proved):
-            return Outcome("OPEN", f"perhaps no rule fires at some rows: {_why(gap)}")
+            return Outcome("OPEN", _gap_text(gap))
 
     def prove(slack: float, steps: int) -> Answer:
         def is_excluded(boxes: Boxes) -> BoolArray:
@@ -80,7 +80,7 @@ def level_outcome(search: Search, claim: LevelClaim) -> Outcome:
     if isinstance(answer, Point):
         return refuted(search.row(answer.values))
     if isinstance(answer, Proved):
-        return Outcome("PROVED", f"bounds of it on {answer.how}")
+        return Outcome("PROVED", f"bounds of it on {_boxes(answer)}")
     slack = _slack(search, prove, scale_of(system, output))
     bound = None
     if slack is not None and (claim.low is None or claim.high is None):
@@ -112,7 +112,7 @@ def slope_outcome(search: Search, claim: SlopeClaim) -> Outcome:
     slopes = Slopes(search.base.fine, claim.input)
     gap = search.ask_gap(bounds.rules)
     if not isinstance(gap, Proved):
-        return Outcome("OPEN", f"perhaps no rule fires at some rows: {_why(gap)}")
+        return Outcome("OPEN", _gap_text(gap))
     how: list[str] = []
     for sign, end in ends:
 
@@ -134,8 +134,8 @@ def slope_outcome(search: Search, claim: SlopeClaim) -> Outcome:
             )
             bound = None if slack is None else end - sign * slack
             return Outcome("OPEN", answer.why, bound=bound)
-        how.append(f"bounds of its slope on {_why(answer)}")
-    return Outcome("PROVED", " and ".join(how))
+        how.append(f"bounds of its slope on {_boxes(answer)}")
+    return Outcome("PROVED", " and ".join(dict.fromkeys(how)))
 
 
 def no_loss(rows: Rows) -> FloatArray:
@@ -153,8 +153,15 @@ def _slack(
     return None
 
 
-def _why(answer: Answer) -> str:
-    return answer.why if isinstance(answer, Open) else answer.how
+def _gap_text(gap: Answer) -> str:
+    if isinstance(gap, Open):
+        return f"perhaps no rule fires for some rows: {gap.why}"
+    return "no rule fires for some rows, which `where` may leave out"
+
+
+def _boxes(answer: Answer) -> str:
+    how = "" if isinstance(answer, Open) else answer.how
+    return "the whole domain" if how == "1 boxes" else how
 
 
 def _output(search: Search, name: str) -> tuple[FuzzySystem, int, float]:

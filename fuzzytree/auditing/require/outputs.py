@@ -98,7 +98,7 @@ class OutputBounds:
         """
         name = self.output.name
         blocks = [block for block in self.system.blocks for _ in block.rules]
-        lost = {one.number: f"{one.name}: {one.reason}" for one in self.base.left_out}
+        lost = {one.number: f"{one.name} ({one.reason})" for one in self.base.left_out}
         groups: dict[tuple[str, bool, tuple[int, ...]], list[int]] = {}
         for number, (rule, block) in enumerate(
             zip(self.system.rules, blocks, strict=True), 1
@@ -216,7 +216,8 @@ class OutputBounds:
         """
         if self.output.aggregation == "algebraic sum":
             name = self.output.name
-            raise NotBoundedError(f"the slope of {name!r}, by algebraic sums")
+            text = f"the slope of {name!r}, an algebraic sum, is not bounded"
+            raise NotBoundedError(text)
         strengths: list[Bounds] = []
         rises: list[Bounds] = []
         for group in self.groups:
