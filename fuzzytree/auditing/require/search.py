@@ -66,6 +66,8 @@ class Search:
         self.model, self.domain, self.steps = model, domain, steps
         self.random = np.random.default_rng(0)
         self.axes = [_values(model, domain, name) for name in model.inputs]
+        sides = [domain.side(name) for name in model.inputs]
+        self.is_whole = np.array([bool(side and side.is_whole) for side in sides], bool)
         self.predict = predictor(model)
 
     @cached_property
@@ -128,6 +130,7 @@ class Search:
         return self._inside(rows)
 
     def _inside(self, rows: Rows) -> Rows:
+        rows[self.is_whole] = np.rint(rows[self.is_whole])
         if len(self.domain.sides) == len(self.axes):  # no sum of inputs is limited
             return rows
         return rows[:, [self._contains(rows[:, k]) for k in range(rows.shape[1])]]
@@ -184,6 +187,8 @@ class Search:
         grid = np.array(marks)
         if not isinstance(marks, tuple):
             grid = np.unique([*marks, *np.linspace(marks[0], marks[-1], _GRID)])
+        if self.is_whole[place]:
+            grid = np.unique(np.rint(grid))
         lines = np.repeat(rows[:, :, None], len(grid), axis=2)
         lines[place] = grid
         if not lines.size:
