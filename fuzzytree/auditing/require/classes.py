@@ -83,11 +83,8 @@ def unchanged_outcome(
     model, rules, axes = search.model, search.base.rules, search.base.axes
     places = [model.inputs.index(name) for name in columns]
     first, other = search.draw(_PAIRS), search.draw(_PAIRS)
-    count = min(first.shape[1], other.shape[1])
-    first, second = first[:, :count], first[:, :count].copy()
-    second[places] = other[places, :count]
-    if len(search.domain.sides) > len(model.inputs):  # sums of inputs are limited
-        second = first
+    second = first.copy()
+    second[places] = other[places]
     a, b = search.predict(first), search.predict(second)
     with np.errstate(invalid="ignore"):
         differs = (np.abs(a - b) > allowed[:, None]) | (np.isnan(a) != np.isnan(b))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from typing import Final
 
 from fuzzytree.auditing.findings.table_words import read_value
@@ -130,7 +130,7 @@ def _add_conditions(text: str, spans: dict[str, _Spans], model: Document) -> Non
             )
         position = match.end()
         name = _plain(match["name"])
-        variable = _member(name, "input", model.variables)
+        variable = _input(name, model)
         pairs = itertools.product(spans.get(name, _ALL), _condition(match, variable))
         left = [(max(a, c), min(b, d)) for (a, b), (c, d) in pairs]
         spans[name] = tuple((low, high) for low, high in left if low <= high)
@@ -186,10 +186,10 @@ def _choose(name: str, noun: str, names: Collection[str]) -> None:
         raise ValueError(f"there is no {noun} {name!r}; {name_choice(name, names)}")
 
 
-def _member(name: str, noun: str, members: Iterable[Variable]) -> Variable:
-    by_name = {member.name: member for member in members}
-    _choose(name, noun, by_name)
-    return by_name[name]
+def _input(name: str, model: Document) -> Variable:
+    inputs = {one.name: one for one in model.variables if not one.parts}
+    _choose(name, "input", inputs)
+    return inputs[name]
 
 
 # --- claims
@@ -219,7 +219,7 @@ def _class_claim(
         if sorted(labels) != sorted(classes):
             raise ValueError(f"the order must name once each of {', '.join(classes)}")
         order = tuple(labels if found["way"] == "rises" else labels[::-1])
-        return OrderClaim(_input(found, model), order)
+        return OrderClaim(_input(found["input"], model).name, order)
     if found.get("how") == "never":
         return ClassClaim((None, *(one for one in classes if one not in labels)))
     return ClassClaim(tuple(labels))
@@ -246,7 +246,7 @@ def _output_claim(
         return LevelClaim(
             output, *((ends["end"], None) if is_low else (None, ends["end"]))
         )
-    name = _input(found, system)
+    name = _input(found["input"], system).name
     if "way" in found:
         return SlopeClaim(
             output, name, *((0.0, None) if found["way"] == "rises" else (None, 0.0))
@@ -263,8 +263,3 @@ def _unchanged(found: dict[str, str], model: Document) -> UnchangedClaim:
     for name in (chosen := [_plain(one) for one in names]):
         _choose(name, "column", columns)
     return UnchangedClaim(tuple(one for one in chosen if one in model.inputs))
-
-
-def _input(found: dict[str, str], model: Document) -> str:
-    inputs = (variable for variable in model.variables if not variable.parts)
-    return _member(found["input"], "input", inputs).name

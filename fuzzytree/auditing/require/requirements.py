@@ -152,17 +152,16 @@ def _part(
         ValueError: If there is none.
     """
     sides: list[DomainSide] = []
-    for variable in model.variables:
-        side = domain.side(variable.name)
-        if side is None and variable.name in box:  # of a sum, which nothing limits yet
-            most = float(np.finfo(np.float64).max)
-            side = DomainSide(variable.name, -most, most)
-        if side is not None and variable.name in box:
+    columns = {variable.name: variable for variable in model.variables}
+    for side in domain.sides:
+        if columns[side.variable].parts:
+            raise ValueError(f"{side.variable!r} is a sum; limits are for its inputs")
+        if side.variable in box:
             ends = f"{side.low:g} to {side.high:g}"
-            low, high = box[variable.name]
+            low, high = box[side.variable]
             low = side.low if math.isinf(low) else low
             high = side.high if math.isinf(high) else high
-            if variable.clips:
+            if columns[side.variable].clips:
                 low, high = max(low, side.low), min(high, side.high)
             if side.is_whole:
                 low, high = math.ceil(low), math.floor(high)
@@ -170,9 +169,8 @@ def _part(
             if low > high or (side.values and not values):
                 raise ValueError(
                     f"{requirement.text!r}: no row meets the conditions, as the values "
-                    f"of {variable.name!r} are {ends}; --limits sets others"
+                    f"of {side.variable!r} are {ends}; --limits sets others"
                 )
             side = replace(side, low=low, high=high, values=values, missing=None)
-        if side is not None:
-            sides.append(side)
+        sides.append(side)
     return Domain(tuple(sides))

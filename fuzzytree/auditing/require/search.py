@@ -117,7 +117,7 @@ class Search:
             is_mark = self.random.random(count) < _LANDMARKS
             is_mark |= isinstance(marks, tuple)
             line[is_mark] = self.random.choice(marks, int(is_mark.sum()))
-        return self._inside(rows)
+        return self._whole(rows)
 
     def near(self, row: Rows, share: float, count: int) -> Rows:
         """Return rows near one, within a share of each range."""
@@ -127,13 +127,11 @@ class Search:
                 step = share * (marks[-1] - marks[0])
                 line += self.random.uniform(-step, step, count)
                 np.clip(line, marks[0], marks[-1], out=line)
-        return self._inside(rows)
+        return self._whole(rows)
 
-    def _inside(self, rows: Rows) -> Rows:
+    def _whole(self, rows: Rows) -> Rows:
         rows[self.is_whole] = np.rint(rows[self.is_whole])
-        if len(self.domain.sides) == len(self.axes):  # no sum of inputs is limited
-            return rows
-        return rows[:, [self._contains(rows[:, k]) for k in range(rows.shape[1])]]
+        return rows
 
     def _contains(self, row: FloatArray) -> bool:
         point = dict(zip(self.model.inputs, map(Fraction, row.tolist()), strict=True))
