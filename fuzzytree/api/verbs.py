@@ -806,20 +806,20 @@ def require(
         1
     """
     document, file = _model_and_file(model, allow_loss)
-    known: list[auditing.Requirement] = []
+    claims: list[auditing.Requirement] = []
     source = ""
     if isinstance(requirements, str | os.PathLike):
         source = os.fspath(requirements)
-        known += auditing.read_requirements(source, document)
+        claims += auditing.read_requirements(source, document)
     elif requirements is not None:
         that = (*requirements, *that)
-    known += [auditing.parse_requirement(text, document) for text in that]
-    names = limits or {}
-    domain = auditing.domain_of(document, limited=names)
+    claims += [auditing.parse_requirement(text, document) for text in that]
+    ends = limits or {}
+    domain = auditing.domain_of(document, limited=ends)
     return auditing.comply(
         document,
-        known,
-        auditing.limited(domain, names, document),
+        claims,
+        auditing.limited(domain, ends, document),
         steps=auditing.STEPS if steps is None else steps,
         title=str(file.name) if file else "",
         source=source,

@@ -62,7 +62,7 @@ def level_outcome(search: Search, claim: LevelClaim) -> Outcome:
         return refuted(rows)
     output = system.outputs[place]
     bounds = OutputBounds(search.base.fine, system, output.name)
-    if output.default is None or not low <= output.default <= high:
+    if output.default is None or output.clips or not low <= output.default <= high:
         gap = search.ask_gap(bounds.rules)
         if isinstance(gap, Point) and loss(search.row(gap.values))[0] > 0.0:
             return refuted(search.row(gap.values))

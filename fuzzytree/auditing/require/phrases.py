@@ -199,66 +199,66 @@ def _claim(text: str, model: Document) -> Claim:
     forms = _OF_OUTPUTS if isinstance(model, FuzzySystem) else _OF_CLASSES
     for pattern, _ in forms:
         if match := re.fullmatch(pattern, text):
-            found = {name: _plain(part) for name, part in match.groupdict().items()}
+            words = {name: _plain(part) for name, part in match.groupdict().items()}
             if isinstance(model, FuzzySystem):
-                return _output_claim(match, found, model)
-            return _class_claim(found, model.classes, model)
+                return _output_claim(match, words, model)
+            return _class_claim(words, model.classes, model)
     shown = "; ".join(form for _, form in forms)
     raise ValueError(f"{text!r} is no requirement of this model; there is {shown}")
 
 
 def _class_claim(
-    found: dict[str, str], classes: tuple[str, ...], model: Document
+    words: dict[str, str], classes: tuple[str, ...], model: Document
 ) -> Claim:
-    if "columns" in found:
-        return _unchanged(found, model)
-    labels = _names(found.get("labels", "")) or [*classes]
+    if "columns" in words:
+        return _unchanged(words, model)
+    labels = _names(words.get("labels", "")) or [*classes]
     for label in labels:
         _choose(label, "class", classes)
-    if "way" in found:
+    if "way" in words:
         if sorted(labels) != sorted(classes):
             raise ValueError(f"the order must name once each of {', '.join(classes)}")
-        order = tuple(labels if found["way"] == "rises" else labels[::-1])
-        return OrderClaim(_input(found["input"], model).name, order)
-    if found.get("how") == "never":
+        order = tuple(labels if words["way"] == "rises" else labels[::-1])
+        return OrderClaim(_input(words["input"], model).name, order)
+    if words.get("how") == "never":
         return ClassClaim((None, *(one for one in classes if one not in labels)))
     return ClassClaim(tuple(labels))
 
 
 def _output_claim(
-    match: re.Match[str], found: dict[str, str], system: FuzzySystem
+    match: re.Match[str], words: dict[str, str], system: FuzzySystem
 ) -> Claim:
-    if "columns" in found:
-        return _unchanged(found, system)
-    if "output" not in found:
+    if "columns" in words:
+        return _unchanged(words, system)
+    if "output" not in words:
         return CoveredClaim()
-    output = found["output"]
+    output = words["output"]
     _choose(output, "output", [one.name for one in system.outputs])
     ends = {
-        name: _number(found[name]) for name in ("low", "high", "end") if name in found
+        name: _number(words[name]) for name in ("low", "high", "end") if name in words
     }
     if "low" in ends and ends["low"] > ends["high"]:
         raise ValueError(_swapped(match))
     if "low" in ends:
         return LevelClaim(output, ends["low"], ends["high"])
-    if "side" in found:
-        is_low = found["side"] == "least"
+    if "side" in words:
+        is_low = words["side"] == "least"
         return LevelClaim(
             output, *((ends["end"], None) if is_low else (None, ends["end"]))
         )
-    name = _input(found["input"], system).name
-    if "way" in found:
+    name = _input(words["input"], system).name
+    if "way" in words:
         return SlopeClaim(
-            output, name, *((0.0, None) if found["way"] == "rises" else (None, 0.0))
+            output, name, *((0.0, None) if words["way"] == "rises" else (None, 0.0))
         )
     if ends["end"] < 0.0:
-        raise ValueError(f"the largest change must be 0 or more, not {found['end']}")
+        raise ValueError(f"the largest change must be 0 or more, not {words['end']}")
     return SlopeClaim(output, name, -ends["end"], ends["end"])
 
 
-def _unchanged(found: dict[str, str], model: Document) -> UnchangedClaim:
+def _unchanged(words: dict[str, str], model: Document) -> UnchangedClaim:
     """Return the claim; no prediction depends on a column that is no input."""
-    names = re.split(r",|\bor\b|\band\b", found["columns"])
+    names = re.split(r",|\bor\b|\band\b", words["columns"])
     columns = sorted({*model.inputs, *getattr(model, "columns", ())})
     for name in (chosen := [_plain(one) for one in names]):
         _choose(name, "column", columns)

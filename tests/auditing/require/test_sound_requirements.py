@@ -9,8 +9,13 @@ import pytest
 from numpy.random import Generator
 
 import fuzzytree as ft
+from fuzzytree.auditing.decide import Base, Boxes, Budget, search_boxes
+from fuzzytree.auditing.findings.domains import domain_of
+from fuzzytree.auditing.require.outputs import OutputBounds
+from fuzzytree.auditing.require.slopes import Slopes
 from fuzzytree.model import (
     And,
+    BoolArray,
     Conclusion,
     Curve,
     Defuzzifier,
@@ -164,8 +169,60 @@ def test_what_is_proved_of_random_systems_holds_at_random_rows() -> None:
 
 @pytest.mark.heavy
 def test_what_is_proved_of_many_random_systems_holds_at_random_rows() -> None:
-    verdicts = [one for seed in range(100) for one in check(system(seed), seed)]
+    verdicts = [one for seed in range(40) for one in check(system(seed), seed)]
     assert verdicts.count("OPEN") < 0.2 * len(verdicts)
+
+
+def check_bounds(model: FuzzySystem, seed: int) -> int:
+    """Compare the bounds on boxes with the model at rows in them; return how many."""
+    chance = np.random.default_rng(seed)
+    base = Base.of(model, domain_of(model)).fine
+    bounds, slopes = OutputBounds(base, model, "y"), Slopes(base, "x0")
+    seen = 0
+
+    def is_excluded(boxes: Boxes) -> BoolArray:
+        nonlocal seen
+        with np.errstate(all="ignore"):
+            number = bounds.numbers(boxes)
+            slope = None
+            if model.outputs[0].aggregation != "algebraic sum":
+                slope = bounds.slopes(boxes, slopes)
+        for k in range(len(boxes.low)):
+            first = {
+                name: stretch.value(chance.uniform(boxes.low[k, n], boxes.high[k, n]))
+                for n, (name, stretch) in enumerate(boxes.stretches.items())
+            }
+            place = boxes.places["x0"]
+            ends = boxes.low[k, place], boxes.high[k, place]
+            second = first | {"x0": boxes.stretches["x0"].value(chance.uniform(*ends))}
+            rows = np.array(
+                [
+                    [float(row.get(f"x{n}", 0)) for row in (first, second)]
+                    for n in range(2)
+                ]
+            )
+            y = numbers(model, rows)
+            is_known = np.isfinite(y)
+            assert np.all((y >= number.low[k] - 1e-9) | ~is_known), seed
+            assert np.all((y <= number.high[k] + 1e-9) | ~is_known), seed
+            far = rows[0, 1] - rows[0, 0]
+            if slope is not None and is_known.all() and abs(far) > 1e-6:
+                secant = (y[1] - y[0]) / far
+                assert slope.low[k] - 1e-6 <= secant <= slope.high[k] + 1e-6, seed
+            seen += 1
+        return np.array(chance.random(len(boxes.low)) < 0.45)
+
+    search_boxes(base, is_excluded, lambda _point: False, Budget(), 40_000)
+    return seen
+
+
+def test_bounds_of_outputs_and_slopes_hold_at_random_rows() -> None:
+    assert sum(check_bounds(system(seed), seed) for seed in range(4)) > 50
+
+
+@pytest.mark.heavy
+def test_bounds_of_many_outputs_and_slopes_hold_at_random_rows() -> None:
+    assert sum(check_bounds(system(seed), seed) for seed in range(300)) > 10_000
 
 
 @pytest.mark.parametrize("seed", range(8))
