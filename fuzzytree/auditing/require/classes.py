@@ -10,7 +10,7 @@ from fuzzytree.auditing.decide import Answer, Open, Point, Proved, Question
 from fuzzytree.auditing.require.claims import OrderClaim
 from fuzzytree.auditing.require.leaves import pair_of_rows
 from fuzzytree.auditing.require.search import Outcome, Rows, Search, prediction_texts
-from fuzzytree.model import FloatArray, FuzzySystem, FuzzyTree, Linear
+from fuzzytree.model import BoolArray, FloatArray, FuzzySystem, FuzzyTree, Linear
 
 _PAIRS = 1024  # of rows that differ in some inputs only
 
@@ -32,11 +32,17 @@ def class_outcome(search: Search, labels: Sequence[str | None]) -> Outcome:
             answers.append(search.ask(Question((k,), rivals, weak)))
     if not isinstance(model, FuzzyTree) and model.semantics.uncovered not in labels:
         answers.append(search.ask_gap(range(len(rules))))
+
+    def loss(row: Rows) -> float:
+        code = int(search.predict(row)[0, 0])
+        return 1.0 if (*model.classes, None)[code] not in labels else -1.0
+
     for answer in answers:
         if isinstance(answer, Point):
             row = search.row(answer.values)
-            (label,) = prediction_texts(model, row)
-            if (label if search.predict(row)[0, 0] >= 0.0 else None) not in labels:
+            if loss(row) > 0.0:
+                row = search.short(row, loss)
+                (label,) = prediction_texts(model, row)
                 return Outcome("REFUTED", f"the prediction is {label}", row)
     rest = [answer for answer in answers if not isinstance(answer, Proved)]
     if rest:
@@ -85,11 +91,15 @@ def unchanged_outcome(
     first, other = search.draw(_PAIRS), search.draw(_PAIRS)
     second = first.copy()
     second[places] = other[places]
-    a, b = search.predict(first), search.predict(second)
-    with np.errstate(invalid="ignore"):
-        differs = (np.abs(a - b) > allowed[:, None]) | (np.isnan(a) != np.isnan(b))
-    for k in np.flatnonzero(differs.any(0))[:1]:
+
+    def differ(one: Rows, two: Rows) -> BoolArray:
+        a, b = search.predict(one), search.predict(two)
+        far = np.abs(a - b) > allowed[:, None]
+        return np.array((far | (np.isnan(a) != np.isnan(b))).any(0))
+
+    for k in np.flatnonzero(differ(first, second))[:1]:
         rows = np.stack([first[:, k], second[:, k]], axis=1)
+        rows = search.short(rows, lambda two: float(differ(two[:, :1], two[:, 1:])[0]))
         return Outcome("REFUTED", "the rows differ in nothing else", rows)
     if isinstance(model, FuzzyTree):
         return _of_leaves(search, columns, lambda one, two: one != two, rises=False)

@@ -148,9 +148,7 @@ class Search:
             if not best.size:
                 return None
             rows = self.near(best, share, _NEAR)
-        return (
-            self._short(best, lambda one: float(loss(one)[0])) if most > 0.0 else None
-        )
+        return self.short(best, lambda one: float(loss(one)[0])) if most > 0.0 else None
 
     def fall(self, name: str, height: Loss, allowed: float) -> Rows | None:
         """Return the two rows between which a number falls most, as an input rises.
@@ -177,7 +175,7 @@ class Search:
             if not best.size:
                 return None
             rows = self.near(best[:, :1], share, _LINES // 4)
-        return self._short(best, loss) if loss(best) > 0.0 else None
+        return self.short(best, loss) if loss(best) > 0.0 else None
 
     def _steepest(self, rows: Rows, place: int, height: Loss) -> Rows:
         """Return the rows of the largest fall on lines along an input; or no rows."""
@@ -201,7 +199,7 @@ class Search:
             return np.empty((0, 0))
         return np.array(lines[:, line][:, [heights[line, :last].argmax(), last]])
 
-    def _short(self, rows: Rows, loss: Callable[[Rows], float]) -> Rows:
+    def short(self, rows: Rows, loss: Callable[[Rows], float]) -> Rows:
         """Return rows of few digits that refute a claim nearly as much."""
         least = _KEPT * loss(rows)
         for digits in _DIGITS:
