@@ -38,7 +38,7 @@ class Decider:
         >>> tree = random_tree(1)
         >>> box = Domain(tuple(DomainSide(name, -1.0, 1.0) for name in tree.inputs))
         >>> decider = Decider(Base.of(tree, box))
-        >>> type(decider.ask(Question(reach=(0, 1), level=ONE + 1), Budget())).__name__
+        >>> type(decider.ask(Question((0, 1), level=Fraction(2)), Budget())).__name__
         'Proved'
     """
 
