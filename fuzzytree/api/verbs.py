@@ -746,7 +746,7 @@ def diff(
         >>> diff(tree, rules_from_tree(tree)).verdict
         'equal'
     """
-    clock = auditing.Clock(budget_s, report=progress)
+    auditing.Clock(budget_s)
     models, files = zip(
         *(_model_and_file(model, allow_loss) for model in (old, new)), strict=True
     )
@@ -767,7 +767,7 @@ def diff(
         domain=auditing.joined_domain(first, second, limits or {}, rows),
         rows=rows,
         settings=settings or auditing.AuditSettings(budget_s=budget_s),
-        clock=clock,
+        report=progress or auditing.silent,
         files=(files[0], files[1]),
         data=source,
     )

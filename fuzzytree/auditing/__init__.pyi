@@ -1,4 +1,5 @@
 from .diff.decisions import all_inputs as all_inputs
+from .diff.decisions import silent as silent
 from .diff.difference_records import Change as Change
 from .diff.difference_records import ComparedModel as ComparedModel
 from .diff.difference_records import Difference as Difference

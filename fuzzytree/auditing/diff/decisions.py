@@ -1,32 +1,27 @@
 """Where two models decide differently, and how that comes about.
 
 The same operations on the same numbers prove decisions equal on any input. Otherwise
-rows of data, probes of both models, points drawn from the domain and points beside
-decision boundaries are tried, each answered exactly; and where these show no
-difference, boxes prove that there is none on the domain, or find it, or leave a bracket
-(`fuzzytree.auditing.engine.equivalence`).
+rows of data, points drawn from the domain and probes of both models are tried, each
+answered exactly; and where these show no difference, the decider proves that there is
+none on the domain, or finds it, or leaves a bracket
+(`fuzzytree.auditing.diff.agreement`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
 import msgspec
 import numpy as np
 
+from fuzzytree.auditing.decide import Budget, OutOfStepsError
+from fuzzytree.auditing.diff.agreement import OF, Agreement, Prediction
 from fuzzytree.auditing.diff.difference_records import DecisionEvidence
 from fuzzytree.auditing.diff.matching import have_same_classes
-from fuzzytree.auditing.engine.arrangement import (
-    ExactPrediction,
-    difference_at,
-    prediction_at,
-)
-from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
+from fuzzytree.auditing.diff.regions import difference_region
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.equivalence import OF, difference_region, equivalence
-from fuzzytree.auditing.engine.probes import ends_of
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -45,7 +40,11 @@ from fuzzytree.auditing.findings.records import (
     FactValue,
 )
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.auditing.findings.support import sample_points, sampled_share
+from fuzzytree.auditing.findings.support import (
+    rows_outside,
+    sample_points,
+    sampled_share,
+)
 from fuzzytree.model import (
     Document,
     FloatArray,
@@ -59,12 +58,17 @@ from fuzzytree.numerics import MISSING, TIE, UNCOVERED, Decisions, decide
 from fuzzytree.semantics import probe_values, proof_faults, unguarded
 
 _PROBES = 4_000  # of each model
-_SEGMENTS = 64  # between points of different decisions, halved down to doubles
-_HALVINGS = 70
 _MOST_LISTED = 24  # pairs of classes with a witness each
 _POINTS = 0.5  # of the budget is for single points, the rest for proofs
-_PORTION = 64  # rows between two looks at the clock, at first
+_PORTION = 1024  # rows between two looks at the budget
 _MOST_REGIONS = 4  # of which the box is looked for
+_SAME_CLASSES = "each class has the same rules: answers differ only where classes tie"
+
+Progress = Callable[[str, float], None]
+
+
+def silent(_: str, __: float) -> None:
+    """Report nothing."""
 
 
 class RulePair(msgspec.Struct, frozen=True, eq=False):
@@ -132,57 +136,40 @@ def decisions(
     pair: RulePair,
     rows: AuditRows | None,
     settings: AuditSettings,
-    clock: Clock,
+    budget: Budget,
+    report: Progress = silent,
 ) -> tuple[list[AuditAnswer], DecisionEvidence]:
     """Return what is known of decisions, and how those that differ come about."""
     whole = _same_everywhere(pair)
     if whole is not None:
         return [whole], DecisionEvidence(is_equal=True)
-    differences = _Differences(pair, clock.share(_POINTS))
+    differences = _Differences(pair, budget.share(_POINTS))
     answers: list[AuditAnswer] = []
     if rows is not None:
         answers.append(_on_rows(rows, differences))
-    values = sample_points(
-        union(pair.old, pair.new), pair.domain, settings.rows, settings.seed
-    )
+    both = union(pair.old, pair.new)
+    values = sample_points(both, pair.domain, settings.rows, settings.seed)
     many, count = differences.add(values)
-    differences.add(_probes(pair))
+    probes = _probes(pair)
+    differences.add(probes[:, ~rows_outside(both, pair.domain, probes)])
     if not differences.witnesses:
-        differences.add(_boundaries(differences, values))
-    if differences.witnesses:
-        answers = [*_witness_answers(pair, differences), *answers]
-    else:
-        clock.report("proving that decisions are equal", 0.3)
-        state = _alike(pair, clock)
+        report("proving that decisions are equal", 0.3)
+        state = differences.both.state(budget)
+        if isinstance(state, Bracket) and have_same_classes(pair.old, pair.new):
+            state = Bracket(OF, 0.0, 0.0, _SAME_CLASSES)
         if isinstance(state, Witness):
             differences.add_point(point_of(state.point))
-            answers = [*_witness_answers(pair, differences), *answers]
         else:
             answers.insert(0, _equal_answer(pair, state))
+    if differences.witnesses:
+        answers = [*_witness_answers(differences), *answers]
     is_open = not isinstance(answers[0].state, Proved)
     if count and is_open:
         answers.append(_drawn_answer(many, count, settings.seed))
-    if is_open and (differences.left or differences.is_cut):
-        points = (
-            f"{differences.left} points"
-            if differences.left
-            else "points beside decision boundaries"
-        )
-        answers.append(left_out(points, "the budget for single points was spent"))
+    if is_open and differences.left:
+        why = "the budget for single points was spent"
+        answers.append(left_out(f"{differences.left} points", why))
     return answers, differences.evidence(is_equal=not is_open)
-
-
-def _alike(pair: RulePair, clock: Clock) -> State:
-    """Return whether both answer alike; the budget is kept even within a box."""
-    try:
-        with enforced(clock):
-            state = equivalence(pair.old, pair.new, pair.domain, clock)
-    except OutOfTimeError:
-        state = Bracket(OF, 0.0, 1.0, "the budget was spent within a box")
-    if isinstance(state, Bracket) and have_same_classes(pair.old, pair.new):
-        why = "each class has the same rules: answers differ only where classes tie"
-        return Bracket(OF, 0.0, 0.0, why)
-    return state
 
 
 def _same_everywhere(pair: RulePair) -> AuditAnswer | None:
@@ -231,45 +218,42 @@ def left_out(points: str, reason: str = "the budget was spent") -> AuditAnswer:
     return audit_answer("FT801.not-compared", "points", state, facts=facts)
 
 
-def _witness_answers(
-    pair: RulePair, differences: _Differences
-) -> Iterator[AuditAnswer]:
+def _witness_answers(differences: _Differences) -> Iterator[AuditAnswer]:
     """Yield a witness for each pair of classes, the clearest one that is known."""
+    both = differences.both
     known = sorted(differences.witnesses.items(), key=lambda item: str(item[0]))
     for number, (labels, (_, name, found_at)) in enumerate(known[:_MOST_LISTED]):
-        point = found_at if name else _simple(pair, labels, found_at)
-        one, other = prediction_at(pair.old, point), prediction_at(pair.new, point)
-        state = difference_at(pair.old, pair.new, point)
+        point = found_at if name else _simple(both, labels, found_at)
+        one, other = both.predictions(point)
+        state = both.witness(point)
         assert state is not None  # only such points are kept
         spans: tuple[Span, ...] = ()
         if number < _MOST_REGIONS:
-            spans = difference_region(pair.old, pair.new, pair.domain, point)
+            spans = difference_region(both, point)
         state = msgspec.structs.replace(state, region=spans)
         facts = {"row": name} if name else {}
         facts |= {"old": _answered(one), "new": _answered(other)}
         title = " -> ".join(map(answer_text, labels))
         yield audit_answer("FT801.differs", title, state, region=spans, facts=facts)
     if len(known) > _MOST_LISTED:
-        left = len(known) - _MOST_LISTED
-        point = known[_MOST_LISTED][1][2]
-        state = difference_at(pair.old, pair.new, point)
+        state = both.witness(known[_MOST_LISTED][1][2])
         assert state is not None
-        yield audit_answer("FT801.more", "more", state, facts={"count": left})
+        left = {"count": len(known) - _MOST_LISTED}
+        yield audit_answer("FT801.more", "more", state, facts=left)
 
 
 def _simple(
-    pair: RulePair, labels: tuple[str | None, str | None], point: dict[str, Fraction]
+    both: Agreement, labels: tuple[str | None, ...], point: dict[str, Fraction]
 ) -> dict[str, Fraction]:
     """Return a point of few digits at which both models answer the same as here."""
 
     def holds(tried: Mapping[str, Fraction]) -> bool:
-        both = (prediction_at(model, tried).label for model in (pair.old, pair.new))
-        return tuple(both) == labels
+        return tuple(one.label for one in both.predictions(tried)) == labels
 
-    return simplified(point, pair.domain, holds)
+    return simplified(point, both.base.domain, holds)
 
 
-def _answered(one: ExactPrediction) -> str:
+def _answered(one: Prediction) -> str:
     if not one.rule:
         return f"{answer_text(one.label)}, for no rule fires"
     how = f"rule {one.rule}, the first of equals" if one.is_tie else f"rule {one.rule}"
@@ -279,8 +263,11 @@ def _answered(one: ExactPrediction) -> str:
 class _Differences:
     """Points at which two models answer differently, and how that comes about."""
 
-    def __init__(self, pair: RulePair, clock: Clock) -> None:
-        self.pair, self.clock, self.left, self.is_cut = pair, clock, 0, False
+    def __init__(self, pair: RulePair, budget: Budget) -> None:
+        self.pair, self.budget, self.left = pair, budget, 0
+        self.both = Agreement(
+            pair.old, pair.new, pair.domain, are_trees=pair.trees is not None
+        )
         self.witnesses: dict[
             tuple[str | None, str | None], tuple[float, str, dict[str, Fraction]]
         ] = {}
@@ -289,15 +276,15 @@ class _Differences:
         self.has_tie = self.has_none = False
 
     def add(self, values: FloatArray, name: str = "") -> tuple[int, int]:
-        """Compare the answers to some rows, as long as there is time.
+        """Compare the answers to some rows, as long as steps are left.
 
         Returns:
             How many differ, of how many that were looked at.
         """
         hits = count = 0
-        for part in portions(values.shape[1], self.clock):
+        for part in portions(values.shape[1], self.both.base.count, self.budget):
             hits += self._add(values[:, part], name, part.start)
-            count = min(part.stop, values.shape[1])
+            count = part.stop
         self.left += values.shape[1] - count
         return hits, count
 
@@ -316,18 +303,24 @@ class _Differences:
         self.has_none |= bool((status == UNCOVERED).any())
         for row in _clearest(one[known], other[known], margins[known]):
             place = int(known[row])
-            x = zip(self.pair.inputs, values[:, place].tolist(), strict=True)
-            point = {key: Fraction(value) for key, value in x}
             title = f"{name} {start + place + 1}" if name else ""
-            self.add_point(point, float(margins[place]), title)
+            point: dict[str, Fraction] = {}
+            for key, x in zip(pair.inputs, values[:, place].tolist(), strict=True):
+                side = pair.domain.side(key)
+                stand_in = None if side is None else side.missing
+                if math.isfinite(x) or stand_in is not None:
+                    point[key] = Fraction(x if math.isfinite(x) else stand_in or 0)
+            if point.keys() == {*pair.inputs}:
+                self.add_point(point, float(margins[place]), title)
         return int(rows.size)
 
     def add_point(
         self, point: dict[str, Fraction], margin: float = 0.0, name: str = ""
     ) -> None:
         """Keep a point, if its pair of classes has no clearer one."""
-        one = prediction_at(self.pair.old, point)
-        other = prediction_at(self.pair.new, point)
+        one, other = self.both.predictions(point)
+        if one.label == other.label:
+            return
         self.old_rules |= {one.rule} - {0}
         self.new_rules |= {other.rule} - {0}
         self.has_tie |= one.is_tie or other.is_tie
@@ -343,19 +336,18 @@ class _Differences:
         return DecisionEvidence(*rules, self.has_tie, self.has_none, is_equal)
 
 
-def portions(count: int, clock: Clock) -> Iterator[slice]:
-    """Yield parts of some rows until the clock is over: at least one, if there are any.
-
-    Rows in fractions take long: parts grow as long as they take little of what is left.
-    """
-    start, size = 0, _PORTION
-    while start < count and (not start or not clock.is_over):
-        before = clock.left_s
-        yield slice(start, start + size)
-        start += size
-        left = clock.left_s
-        if math.isinf(left) or (before - left) * 16 < left:
-            size *= 2
+def portions(count: int, steps: int, budget: Budget) -> Iterator[slice]:
+    """Yield parts of some rows, of so many steps each, until the budget is spent."""
+    start = 0
+    while start < count:
+        size = min(_PORTION, max(budget.left // steps, 1))
+        part = slice(start, min(start + size, count))
+        try:
+            budget.spend((part.stop - start) * steps)
+        except OutOfStepsError:
+            return
+        yield part
+        start = part.stop
 
 
 def _clearest(one: IntArray, other: IntArray, margins: FloatArray) -> list[int]:
@@ -367,51 +359,21 @@ def _clearest(one: IntArray, other: IntArray, margins: FloatArray) -> list[int]:
     return list(best.values())
 
 
-def inside(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the points that are within some ends; shape (inputs, points)."""
-    kept: FloatArray = values[:, ((values >= low) & (values <= high)).all(axis=0)]
-    return kept
-
-
 def _probes(pair: RulePair) -> FloatArray:
-    """Return the probes of both models that are on the domain."""
+    """Return the probes of both models; other inputs stay in the middle."""
     low, high = ends_of(pair.domain, pair.inputs)
     probes: list[FloatArray] = []
     for model in (pair.old, pair.new):
         known = probe_values(model, _PROBES)
-        # An input that this model does not use stays in the middle of its side.
         values = np.repeat(low / 2 + high / 2, known.shape[1], axis=1)
         values[[pair.inputs.index(name) for name in model.inputs]] = known
         probes.append(values)
-    return inside(np.hstack(probes), low, high)
+    return np.hstack(probes)
 
 
-def _boundaries(differences: _Differences, values: FloatArray) -> FloatArray:
-    """Return points beside the old model's decision boundaries, to the last double.
-
-    Points of different decisions are joined, and the line is halved as long as its
-    ends are decided differently by the old model, or until the clock is over.
-    """
-    if not values.shape[1]:
-        return values
-    pair, clock = differences.pair, differences.clock
-    parts: list[IntArray] = []
-    labels = pairs = np.zeros(0, np.int64)
-    for part in portions(values.shape[1], clock):
-        parts.append(pair.decide(pair.old, values[:, part]).label)
-        labels = np.concatenate(parts)
-        pairs = np.flatnonzero(labels[:-1] != labels[1:])[:_SEGMENTS]
-        if pairs.size == _SEGMENTS:
-            break
-    differences.is_cut = pairs.size < _SEGMENTS and labels.size < values.shape[1]
-    low, high, known = values[:, pairs], values[:, pairs + 1], labels[pairs]
-    points = [low, high]
-    for _ in range(_HALVINGS if pairs.size else 0):
-        if clock.is_over:
-            differences.is_cut = True
-            break
-        middle = low / 2 + high / 2
-        is_low = pair.decide(pair.old, middle).label == known
-        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
-        points.append(middle)
-    return np.hstack(points)
+def ends_of(domain: Domain, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper ends of some inputs, each of shape (inputs, 1)."""
+    sides = {side.variable: side for side in domain.sides}
+    ends = [(sides[name].low, sides[name].high) for name in names]
+    low, high = np.array(ends).reshape(len(names), 2).T
+    return low[:, None], high[:, None]

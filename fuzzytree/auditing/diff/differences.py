@@ -6,7 +6,15 @@ from collections.abc import Sequence
 
 import msgspec
 
-from fuzzytree.auditing.diff.decisions import RulePair, all_inputs, decisions, union
+from fuzzytree.auditing.decide import Budget
+from fuzzytree.auditing.diff.decisions import (
+    Progress,
+    RulePair,
+    all_inputs,
+    decisions,
+    silent,
+    union,
+)
 from fuzzytree.auditing.diff.difference_records import (
     Change,
     ComparedModel,
@@ -18,7 +26,6 @@ from fuzzytree.auditing.diff.difference_records import (
 from fuzzytree.auditing.diff.structure import draft_changes
 from fuzzytree.auditing.diff.system_differences import draft_system_changes
 from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
-from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import source_of, with_confirmations
 from fuzzytree.auditing.findings.domains import Limits, domain_of, limited
@@ -113,7 +120,8 @@ def difference(
     domain: Domain,
     rows: AuditRows | None = None,
     settings: AuditSettings | None = None,
-    clock: Clock | None = None,
+    budget: Budget | None = None,
+    report: Progress = silent,
     files: tuple[ModelFile | None, ModelFile | None] = (None, None),
     data: SourceFile | None = None,
 ) -> Difference:
@@ -125,7 +133,8 @@ def difference(
         domain: A side for each input of either.
         rows: Rows of the inputs of either, the old one's first.
         settings: How many points are drawn, and their seed.
-        clock: How much time there is.
+        budget: How many steps may be taken.
+        report: Called with the current step, and the share of the work that is done.
         files: Where the two were read from.
         data: Where the rows were read from.
 
@@ -140,7 +149,7 @@ def difference(
         'equal'
     """
     settings = settings or AuditSettings()
-    clock = clock or Clock()
+    budget = budget or Budget()
     both = old, new
     systems = [one for one in both if isinstance(one, FuzzySystem)]
     systems = [one for one in systems if as_rules(one, None) is None]
@@ -148,16 +157,16 @@ def difference(
         first, second = systems
         drafts = [*draft_system_changes(first, second)]
         numbers = SystemPair(first, second, all_inputs(old, new), domain)
-        answers = number_answers(numbers, rows, settings, clock)
+        answers = number_answers(numbers, rows, settings, budget, report)
         is_equal = any(one.subject == "decisions" for one in answers)  # proved
         has_number = any(one.is_finding for one in answers)
         evidence = DecisionEvidence(is_equal=is_equal, has_number=has_number)
     else:
         pair = _rule_pair(both, files, domain)
-        clock.report("comparing rules", 0.0)
+        report("comparing rules", 0.0)
         drafts = [*draft_changes(pair.old, pair.new, domain, pair.trees)]
-        clock.report("comparing decisions", 0.1)
-        answers, evidence = decisions(pair, rows, settings, clock)
+        report("comparing decisions", 0.1)
+        answers, evidence = decisions(pair, rows, settings, budget, report)
     changes = [_placed(one, evidence, both, files) for one in drafts]
     order = {"breaking": 0, "non-breaking": 1, "cosmetic": 2}
     one, other = (
@@ -181,12 +190,10 @@ def difference(
         tuple(sorted(changes, key=lambda change: order[change.grade])),
         tuple(map(words.answer, answers)),
     )
-    return _proved_twice(result, both, clock)
+    return _proved_twice(result, both)
 
 
-def _proved_twice(
-    result: Difference, models: tuple[Document, Document], clock: Clock
-) -> Difference:
+def _proved_twice(result: Difference, models: tuple[Document, Document]) -> Difference:
     """Return a comparison in which PROVED is only what the re-checker decides too."""
 
     def confirmation() -> Confirmation:

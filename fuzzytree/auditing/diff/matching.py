@@ -13,13 +13,15 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
-from fuzzytree.auditing.engine.contenders import AxisKey
 from fuzzytree.auditing.engine.pieces import PolynomialPiece, pieces
-from fuzzytree.model import Proposition, Rule, RuleBase, Shape, shapes_of
+from fuzzytree.model import Part, Proposition, Rule, RuleBase, Shape, shapes_of
 
 How = Literal["same", "class", "curves", "propositions"]
 
 _MOST_LEFT = 400  # rules on either side, of which each two are compared
+
+AxisKey = str | tuple[Part, ...]
+"""The name of an input, or the summands of a combination."""
 
 PropositionKey = tuple[AxisKey, bool, frozenset[int]]
 NamedKey = tuple[str, bool, frozenset[str]]

@@ -11,6 +11,7 @@ import msgspec
 
 from fuzzytree.auditing.diff.difference_records import Draft, Shown, renamed_model
 from fuzzytree.auditing.diff.matching import (
+    AxisKey,
     Curves,
     Match,
     Matching,
@@ -18,7 +19,6 @@ from fuzzytree.auditing.diff.matching import (
     matching,
     words_of,
 )
-from fuzzytree.auditing.engine.contenders import AxisKey
 from fuzzytree.auditing.engine.domain import Domain, span
 from fuzzytree.auditing.engine.measures import curve_distance
 from fuzzytree.auditing.engine.states import answer_text, listed

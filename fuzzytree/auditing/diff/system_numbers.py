@@ -17,13 +17,19 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.diff.decisions import inside, left_out, portions, union
+from fuzzytree.auditing.decide import Budget, OutOfStepsError
+from fuzzytree.auditing.diff.decisions import (
+    Progress,
+    ends_of,
+    left_out,
+    portions,
+    silent,
+    union,
+)
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
 from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
-from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.probes import ends_of
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -40,7 +46,11 @@ from fuzzytree.auditing.findings.records import (
     Measure,
 )
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.auditing.findings.support import sample_points, sampled_share
+from fuzzytree.auditing.findings.support import (
+    rows_outside,
+    sample_points,
+    sampled_share,
+)
 from fuzzytree.model import FloatArray, FuzzySystem, SystemRun
 from fuzzytree.numerics import outwards
 from fuzzytree.runtimes import run_system
@@ -48,6 +58,7 @@ from fuzzytree.semantics import system_probes
 
 _PROBES = 2_000  # of each system
 _DRAWN = 4_000  # at most, for numbers take longer than decisions
+_STEPS = 10  # of a rule in a row
 _ROUNDING = 1e-9  # relative; what one function of real numbers may differ by
 _MOST_SHOWN = 0.9  # of the largest difference, at a witness of fewer digits
 
@@ -61,6 +72,11 @@ class SystemPair(NamedTuple):
     domain: Domain
 
     @property
+    def rules(self) -> int:
+        """How many rules both have together."""
+        return len(self.old.rules) + len(self.new.rules)
+
+    @property
     def outputs(self) -> tuple[str, ...]:
         """The names of the outputs that both have."""
         names = {one.name for one in self.new.outputs}
@@ -68,24 +84,26 @@ class SystemPair(NamedTuple):
 
 
 def number_answers(
-    pair: SystemPair, rows: AuditRows | None, settings: AuditSettings, clock: Clock
+    pair: SystemPair,
+    rows: AuditRows | None,
+    settings: AuditSettings,
+    budget: Budget,
+    report: Progress = silent,
 ) -> list[AuditAnswer]:
     """Return what is known of the numbers that two systems have in common."""
     try:
-        with enforced(clock):
-            hows = _hows(pair)
-            open_ = [name for name, how in hows.items() if how is not _SAME]
-            if not open_:
-                return [_proved(pair, "", _SAME.how)] if hows else []
-            runs = [run_system(system) for system in (pair.old, pair.new)]
-    except OutOfTimeError:
-        reason = "the budget was spent"
-        facts = {"points": "the numbers of the two"}
-        state = Declined("FTD03", reason)
-        return [audit_answer("FT801.not-compared", "numbers", state, facts=facts)]
+        budget.spend(_STEPS * pair.rules)
+    except OutOfStepsError:
+        left = left_out("the numbers of the two")
+        return [msgspec.structs.replace(left, subject="numbers")]
+    hows = _hows(pair)
+    open_ = [name for name, how in hows.items() if how is not _SAME]
+    if not open_:
+        return [_proved(pair, "", _SAME.how)] if hows else []
+    runs = [run_system(system) for system in (pair.old, pair.new)]
     rounded = frozenset(name for name, how in hows.items() if how is _ROUNDED)
     differences = _Differences(pair, open_, rounded, runs)
-    answers = [*_sampled(differences, rows, settings, clock)]
+    answers = [*_sampled(differences, rows, settings, budget, report)]
     if differences.differing:
         answers = [*map(differences.witness, differences.differing), *answers]
     elif None not in hows.values():
@@ -145,33 +163,33 @@ def _sampled(
     differences: _Differences,
     rows: AuditRows | None,
     settings: AuditSettings,
-    clock: Clock,
+    budget: Budget,
+    report: Progress,
 ) -> Iterator[AuditAnswer]:
     """Yield how often outputs differ, and what the budget left out."""
     pair = differences.pair
     low, high = ends_of(pair.domain, pair.columns)
     drawn, seed = min(settings.rows, _DRAWN), settings.seed
-    points = sample_points(union(pair.old, pair.new), pair.domain, drawn, seed)
+    both = union(pair.old, pair.new)
+    points = sample_points(both, pair.domain, drawn, seed)
     samples: list[tuple[str, FloatArray, str]] = []
     if rows is not None:
         samples.append(("rows", rows.values, f"rows of {rows.name}"))
-    probes = np.hstack(
-        [_probes(one, pair.columns, low, high) for one in (pair.old, pair.new)]
-    )
+    parts = [_probes(one, pair.columns, low, high) for one in (pair.old, pair.new)]
+    probes = np.hstack(parts)
+    probes = probes[:, ~rows_outside(both, pair.domain, probes)]
     samples.append(("probes", probes, "probes of both systems within the domain"))
     how = f"points drawn evenly from the domain, seed {seed}"
     samples.append(("domain", points, how))
     left = 0
     for place, (subject, values, how) in enumerate(samples):
-        clock.report("comparing numbers", place / len(samples))
-        count = values.shape[1]
-        if count:
-            hits, number = differences.add(
-                values, clock.share(1.0 / (len(samples) - place))
-            )
-            left += count - number
-            if number:
-                yield _counted(differences, subject, hits, number, how)
+        report("comparing numbers", place / len(samples))
+        hits, number = differences.add(
+            values, budget.share(1.0 / (len(samples) - place))
+        )
+        left += values.shape[1] - number
+        if number:
+            yield _counted(differences, subject, hits, number, how)
     if left:
         yield left_out(f"{left} points")
 
@@ -199,8 +217,7 @@ def _probes(
         [row.get(name, at) for row in known]
         for name, at in zip(columns, middle, strict=True)
     ]
-    values = np.array(table, np.float64).reshape(len(columns), len(known))
-    return inside(values, low, high)
+    return np.array(table, np.float64).reshape(len(columns), len(known))
 
 
 class _Largest(NamedTuple):
@@ -232,16 +249,12 @@ class _Differences:
         """The outputs that were seen to differ."""
         return [name for name in self.outputs if name in self.largest]
 
-    def add(self, values: FloatArray, clock: Clock) -> tuple[int, int]:
-        """Compare some rows as long as there is time; return how many differ, of."""
+    def add(self, values: FloatArray, budget: Budget) -> tuple[int, int]:
+        """Compare some rows as long as steps are left; return how many differ, of."""
         hits = count = 0
-        for part in portions(values.shape[1], clock):
-            try:
-                with enforced(clock):
-                    hits += self._add(values[:, part])
-            except OutOfTimeError:
-                break
-            count = min(part.stop, values.shape[1])
+        for part in portions(values.shape[1], _STEPS * self.pair.rules, budget):
+            hits += self._add(values[:, part])
+            count = part.stop
         return hits, count
 
     def _add(self, values: FloatArray) -> int:

@@ -13,9 +13,9 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
+from fuzzytree.auditing.decide import Budget
 from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference
-from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.measures import curve_distance
 from fuzzytree.auditing.engine.states import (
     Bracket,
@@ -331,11 +331,13 @@ def test_what_cannot_be_decided_is_left_open_and_said_so() -> None:
 
 def test_points_that_a_spent_budget_leaves_out_are_reported() -> None:
     old, new = grip(), replace(grip(), rules=grip().rules[::-1])
-    ticks = itertools.count()
-    clock = Clock(4.0, now=lambda: float(next(ticks)))  # over after a few looks
     values = np.zeros((len(old.inputs), 5000))
     found = difference(
-        old, new, domain=domain_of(old), rows=AuditRows("rows.csv", values), clock=clock
+        old,
+        new,
+        domain=domain_of(old),
+        rows=AuditRows("rows.csv", values),
+        budget=Budget(20_000),
     )
     rows = next(one for one in found.answers if one.subject == "rows")
     assert isinstance(rows.state, Sampled)

@@ -11,12 +11,12 @@ from types import MappingProxyType
 import pytest
 from msgspec.structs import replace
 
+from fuzzytree.auditing.decide import Budget
 from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference, joined_domain
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
 from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
-from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -91,10 +91,10 @@ def tipper(
 
 
 def results(
-    old: FuzzySystem, new: FuzzySystem, clock: Clock | None = None
+    old: FuzzySystem, new: FuzzySystem, budget: Budget | None = None
 ) -> Difference:
     domain = joined_domain(old, new, {})
-    return difference(old, new, domain=domain, settings=FEW, clock=clock)
+    return difference(old, new, domain=domain, settings=FEW, budget=budget)
 
 
 def with_rules(system: FuzzySystem, *rules: SystemRule) -> FuzzySystem:
@@ -272,30 +272,18 @@ def test_an_output_that_stays_is_proved_beside_one_that_differs() -> None:
 
 
 def test_the_budget_ends_the_comparison_of_numbers() -> None:
-    new, hour = tipper(numbers={"high": 25.5}), [0.0]
-
-    def now() -> float:
-        hour[0] += 0.001
-        return hour[0]
-
-    def tell(text: str, done: float) -> None:
-        if text == "comparing numbers" and done > 0.0:  # behind the probes
-            hour[0] = 999.0
-
-    found = results(tipper(), new, Clock(99.0, now=now, report=tell))
+    new = tipper(numbers={"high": 25.5})
+    found = results(tipper(), new, Budget(10_000))
     (left,) = (a for a in found.answers if a.subject == "points")
-    assert left.sentence == "36 points were not compared: the budget was spent"
+    assert left.sentence == "3888 points were not compared: the budget was spent"
     assert left.state == Declined("FTD03", "the budget was spent")
     assert found.verdict == "changed"
-    whole = results(tipper(), new, Clock(99.0, now=now))
+    whole = results(tipper(), new)
     assert all(a.subject != "points" for a in whole.answers)
 
 
 def test_a_budget_that_is_spent_before_anything_was_compared_is_reported() -> None:
-    now = iter(range(10**9))
-    found = results(
-        tipper(), tipper(numbers={"low": 6.0}), Clock(3.0, now=lambda: next(now))
-    )
+    found = results(tipper(), tipper(numbers={"low": 6.0}), Budget(3))
     (answer,) = found.answers
     assert answer.sentence == (
         "the numbers of the two were not compared: the budget was spent"

@@ -5,17 +5,12 @@ from __future__ import annotations
 import threading
 from fractions import Fraction
 
-import msgspec
 import pytest
 
-from fuzzytree.auditing.diff import decisions
 from fuzzytree.auditing.engine.clock import GRACE_S, Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.pieces import RuleCurve
-from fuzzytree.auditing.engine.states import Bracket
-from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.model.rulebase import Points
-from tests.auditing.engine.bases import random_base, unit_domain
 
 
 def over(by_s: float) -> Clock:
@@ -70,22 +65,3 @@ def test_every_thread_has_a_clock_of_its_own() -> None:
         thread.start()
         thread.join()
     assert ended == ["late"]
-
-
-def test_a_comparison_ends_within_a_box_that_holds_no_clock(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def endless(*_: object) -> None:
-        forever()
-
-    monkeypatch.setattr(decisions, "equivalence", endless)
-    old = random_base(1, 3, 2)
-    first, *_, last = old.rules
-    narrower = msgspec.structs.replace(last, when=(*last.when, first.when[0]))
-    new = msgspec.structs.replace(old, rules=(*old.rules, narrower))
-    pair = decisions.RulePair(old, new, old.inputs, unit_domain(old))
-    (answer, *_), _ = decisions.decisions(
-        pair, None, AuditSettings(rows=10), Clock(0.05)
-    )
-    assert isinstance(answer.state, Bracket)
-    assert answer.state.why == "the budget was spent within a box"
