@@ -5,7 +5,8 @@ In reading order:
 - `difference_records`: a change, its grade, and the whole difference
 - `matching`: which rule corresponds to which, by content
 - `structure`: changes of rules, classes, variables and terms
-- `agreement`, `regions`: do two models decide alike everywhere; a box on which they differ
+- `agreement`: do two models decide alike everywhere
+- `regions`: a box on which they differ
 - `decisions`: where two models decide differently
 - `system_keys`, `system_bounds`, `system_numbers`: how a system computes an output; its
   number in fractions, and how far two can be apart; what is known of both

@@ -38,6 +38,7 @@ from fuzzytree.auditing.decide import (
 )
 from fuzzytree.auditing.decide import Literal as Degree
 from fuzzytree.auditing.decide.answers import ONE, ZERO
+from fuzzytree.auditing.decide.rules import Norm
 from fuzzytree.auditing.decide.solver import Solver, solver_for
 from fuzzytree.auditing.engine import states
 from fuzzytree.auditing.engine.domain import Domain
@@ -89,6 +90,11 @@ class Agreement:
         self.models, self.are_trees = (old, new), are_trees
         self.base = Base.of_both(old, new, domain)
         self.decider = Decider(self.base)
+        norm: Norm = "minimum"  # as far as a strength of 1 goes, the product is it
+        ones = (rule._replace(norm=norm) for rule in self.base.rules)
+        self.ones = self.decider
+        if not self.base.is_lattice:
+            self.ones = Decider(Base([*ones], self.base.variables, domain))
         count = len(old.rules)
         self.groups = range(count), range(count, self.base.count)
         self._below: dict[tuple[str, Degree, Degree], bool] = {}
@@ -318,8 +324,9 @@ class Agreement:
     def _ask(self, question: Question, budget: Budget) -> Answer:
         """Ask the decider, with a small budget: there are many pairs."""
         few = Budget(min(_QUICK, budget.left), budget)
+        decider = self.ones if question.level == ONE else self.decider
         try:
-            return self.decider.ask(question, few)
+            return decider.ask(question, few)
         except OutOfStepsError:
             if budget.is_spent:
                 raise
