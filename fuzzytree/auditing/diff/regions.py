@@ -119,8 +119,12 @@ class _Region:
 
     def _range(self, name: str, degree: Literal, ends: Ends) -> Ends:
         """Return bounds of a degree between two values of an axis."""
-        low, high = self.base.axes[name].bounds[degree]
-        return min(_values(low, ends)), max(_values(high, ends))
+        pick = min if degree.negated else max
+        low, high = self.base.axes[name].parts[degree]
+        return (
+            pick(min(_values(one, ends)) for one in low),
+            pick(max(_values(one, ends)) for one in high),
+        )
 
 
 def _values(lines: Lines, ends: Ends) -> list[Fraction]:
