@@ -1,54 +1,34 @@
 """The number of a system's output in fractions, and how far two outputs can be apart.
 
-Outputs that weight numbers are evaluated exactly where every curve and operation is one
-of fractions. A bound holds for real numbers: a weighted average moves by no more than
-its numbers do while the degrees stay, and always lies between them.
+Outputs that weight numbers are evaluated exactly where every strength is a fraction. A
+bound holds for real numbers: a weighted average moves by no more than its numbers do
+while the degrees stay, and always lies between them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
-from functools import reduce
 from types import MappingProxyType
 from typing import TypeVar
 
+from fuzzytree.auditing.decide import Base
 from fuzzytree.auditing.diff.system_keys import Contribution, contributions, facts_of
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.model import (
-    And,
-    Condition,
     Formula,
     FuzzySystem,
     Linear,
-    Not,
-    Or,
-    Proposition,
-    RuleBlock,
     Singleton,
     SystemOutput,
     Term,
     Variable,
 )
-from fuzzytree.numerics import exact_degree
-from fuzzytree.semantics import joined_outputs, shape_of
+from fuzzytree.semantics import joined_outputs
 
-_ONE = Fraction(1)
-_Operation = Callable[[Fraction, Fraction], Fraction]
-_NORMS: Mapping[str, _Operation] = MappingProxyType(
-    {
-        "minimum": min,
-        "product": lambda a, b: a * b,
-        "bounded difference": lambda a, b: max(Fraction(0), a + b - 1),
-        "maximum": max,
-        "algebraic sum": lambda a, b: a + b - a * b,
-        "bounded sum": lambda a, b: min(_ONE, a + b),
-        "sum": lambda a, b: a + b,
-    }
-)
 _HEDGES: Mapping[str, Callable[[Fraction], Fraction]] = MappingProxyType(
     {
-        "any": lambda _: _ONE,
+        "any": lambda _: Fraction(1),
         "not": lambda d: 1 - d,
         "very": lambda d: d**2,
         "cubed": lambda d: d**3,
@@ -63,65 +43,65 @@ class NotExactError(Exception):
     """A part of a system has no value in fractions."""
 
 
-def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None:
-    """Return the number of an output at a point, None where it is no number.
+class ExactSystem:
+    """A system whose outputs are evaluated in fractions."""
 
-    Raises:
-        NotExactError: If the output looks at a curve, or some curve, norm, hedge or
-            activation is none of fractions, or a rule uses an output.
-    """
-    one = _named(system.outputs, output)
-    how = one.defuzzifier
-    if not how.is_weighted or output in joined_outputs(system):
-        raise NotExactError(output)
-    values = _values(system.variables, point)
-    total = weight = Fraction(0)
-    is_number = False
-    for block in system.blocks:
-        for rule in block.rules:
-            then = [each.output for each in rule.then]
-            if output not in then or not rule.weight:
+    def __init__(self, system: FuzzySystem, domain: Domain) -> None:
+        self.system, self.base = system, Base.of(system, domain)
+        self.left_out = {one.number for one in self.base.left_out}
+
+    def number(self, output: str, point: Point) -> Fraction | None:
+        """Return the number of an output at a point, None where it is no number.
+
+        Raises:
+            NotExactError: If the output looks at a curve, or a strength is none of
+                fractions, or a rule uses an output.
+        """
+        system, one = self.system, _named(self.system.outputs, output)
+        if not one.defuzzifier.is_weighted or output in joined_outputs(system):
+            raise NotExactError(output)
+        inner = (v for v in system.variables if v.clips and not v.parts)
+        point = {**point, **{v.name: _clamped(v, point[v.name]) for v in inner}}
+        low, high = self.base.strengths(point)
+        total = weight = Fraction(0)
+        blocks = [block for block in system.blocks for _ in block.rules]
+        for number, (rule, block) in enumerate(
+            zip(system.rules, blocks, strict=True), 1
+        ):
+            if not rule.weight or all(each.output != output for each in rule.then):
                 continue
-            if block.activation.method != "general":
-                raise NotExactError(block.activation.method)
-            degree = Fraction(rule.weight)
-            degree *= 1 if rule.when is None else _at(rule.when, block, system, values)
-            for conclusion in rule.then if degree > 0 else ():
-                degree = _hedged(conclusion.hedges, degree)
+            ways = [k for k, of in enumerate(self.base.rules) if of.number == number]
+            is_exact = number not in self.left_out and all(
+                low[k] == high[k] for k in ways
+            )
+            if not is_exact or block.activation.method != "general":
+                raise NotExactError(output)
+            degree = max((low[k] for k in ways), default=Fraction(0))
+            for conclusion in rule.then if degree else ():
+                for hedge in reversed(conclusion.hedges):
+                    if hedge not in _HEDGES:
+                        raise NotExactError(hedge)
+                    degree = _HEDGES[hedge](degree)
                 if conclusion.output == output and degree > 0:
-                    label = _named(one.terms, conclusion.term)
-                    total += degree * _number(label, system, values)
+                    known = _linear(_named(one.terms, conclusion.term), system)
+                    if known is None:
+                        raise NotExactError(output)
+                    parts = (w * point[name] for name, w in known[0].items())
+                    total += degree * sum(parts, known[1])
                     weight += degree
-                    is_number = True
-    if not is_number:
-        return _answered(one, None)
-    is_average = how.method == "weighted average"
-    return _answered(one, total / weight if is_average else total)
+        result = None if one.default is None else Fraction(one.default)
+        if weight:
+            is_average = one.defuzzifier.method == "weighted average"
+            result = total / weight if is_average else total
+        return _clamped(one, result) if one.clips and result is not None else result
 
 
-def _values(inputs: Sequence[Variable], point: Point) -> dict[str, Fraction]:
-    values: dict[str, Fraction] = {}
-    for one in inputs:
-        value = point.get(one.name, Fraction(0))
-        if one.parts:
-            centred = ((p, values[p.input] - Fraction(p.centre)) for p in one.parts)
-            value = sum((Fraction(p.weight) * x for p, x in centred), Fraction(0))
-        values[one.name] = _clamped(one, value) if one.clips else value
-    return values
-
-
-def _clamped(one: Variable | SystemOutput, value: Fraction) -> Fraction:
+def _clamped(one: SystemOutput | Variable, value: Fraction) -> Fraction:
     value = value if one.low is None else max(value, Fraction(one.low))
     return value if one.high is None else min(value, Fraction(one.high))
 
 
-def _answered(one: SystemOutput, number: Fraction | None) -> Fraction | None:
-    if number is None and one.default is not None:
-        number = Fraction(one.default)
-    return _clamped(one, number) if one.clips and number is not None else number
-
-
-_Named = TypeVar("_Named", Variable, SystemOutput, Term)
+_Named = TypeVar("_Named", SystemOutput, Term)
 _Sum = tuple[Mapping[str, Fraction], Fraction]
 
 
@@ -147,46 +127,6 @@ def _linear(label: Term, system: FuzzySystem) -> _Sum | None:
             return {name: Fraction(w) for name, w in pairs if w}, Fraction(offset)
         case _:
             return None
-
-
-def _number(label: Term, system: FuzzySystem, values: Point) -> Fraction:
-    known = _linear(label, system)
-    if known is None:
-        raise NotExactError(str(label.function))
-    weights, offset = known
-    return sum((w * values[name] for name, w in weights.items()), offset)
-
-
-def _hedged(hedges: Sequence[str], degree: Fraction) -> Fraction:
-    for hedge in reversed(hedges):
-        if hedge not in _HEDGES:
-            raise NotExactError(hedge)
-        degree = _HEDGES[hedge](degree)
-    return degree
-
-
-def _at(
-    when: Condition, block: RuleBlock, system: FuzzySystem, values: Point
-) -> Fraction:
-    match when:
-        case Proposition(variable=name, term=label, hedges=hedges):
-            if label is None:
-                return _hedged(hedges, Fraction(0))  # the last, `any`, makes 1 of it
-            term = _named(_named(system.variables, name).terms, label)
-            shape = shape_of(term.function)
-            if shape is None:
-                raise NotExactError(name)
-            degree = Fraction(term.height) * exact_degree(shape, values[name])
-            return _hedged(hedges, degree)
-        case Not(part=part):
-            return 1 - _at(part, block, system, values)
-        case And(parts=parts):
-            norm: str = block.conjunction or "minimum"
-        case Or(parts=parts):
-            norm = block.disjunction or "maximum"
-    if norm not in _NORMS:
-        raise NotExactError(norm)
-    return reduce(_NORMS[norm], (_at(part, block, system, values) for part in parts))
 
 
 # --- bounds

@@ -27,7 +27,7 @@ from fuzzytree.auditing.diff.decisions import (
     union,
 )
 from fuzzytree.auditing.diff.matching import Curves
-from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
+from fuzzytree.auditing.diff.system_bounds import ExactSystem, NotExactError, most
 from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import (
@@ -241,6 +241,7 @@ class _Differences:
     ) -> None:
         self.pair, self.outputs, self.runs = pair, outputs, runs
         self.is_rounded = np.array([name in rounded for name in outputs])
+        self.exact = [ExactSystem(one, pair.domain) for one in (pair.old, pair.new)]
         self.largest: dict[str, _Largest] = {}
         self.rounding = 0.0
 
@@ -320,8 +321,8 @@ class _Differences:
         self, name: str, point: Mapping[str, Fraction]
     ) -> tuple[Fraction | None, Fraction | None]:
         """Return the numbers of an output in both systems, in fractions."""
-        pair = self.pair
-        return number_at(pair.old, name, point), number_at(pair.new, name, point)
+        old, new = self.exact
+        return old.number(name, point), new.number(name, point)
 
     def _simple(self, name: str, point: Mapping[str, Fraction]) -> dict[str, Fraction]:
         """Return a point of few digits where an output differs nearly as much."""
