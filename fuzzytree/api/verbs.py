@@ -715,7 +715,7 @@ def diff(
     *,
     data: object = None,
     limits: auditing.Limits | None = None,
-    budget_s: float = 60.0,
+    budget: float = 60.0,
     settings: auditing.AuditSettings | None = None,
     allow_loss: bool = False,
     progress: Progress | None = None,
@@ -727,7 +727,8 @@ def diff(
         new: Another one, in any format.
         data: A table with rows of one's own, which both answer.
         limits: The ends of inputs, which go before the ranges of the models.
-        budget_s: After so many seconds what is not decided stays open.
+        budget: After so many million steps what is not decided stays open. A million
+            is about a second of work, and the same answers on any machine.
         settings: How many points are drawn from the domain, and their seed.
         allow_loss: As in `load`, for both files.
         progress: Called with what is done and which share of it.
@@ -737,7 +738,8 @@ def diff(
             one gives numbers and the other decides.
         LossError: As `load`.
         TableError: If a column is absent or holds text, or the table has no row.
-        ValueError: If a limit is none, or an input has no limits.
+        ValueError: If a limit is none, or an input has no limits, or the budget is not
+            above 0.
 
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
@@ -746,7 +748,8 @@ def diff(
         >>> diff(tree, rules_from_tree(tree)).verdict
         'equal'
     """
-    auditing.Clock(budget_s)
+    if not budget > 0.0:
+        raise ValueError(f"the budget must be above 0 million steps, not {budget!r}")
     models, files = zip(
         *(_model_and_file(model, allow_loss) for model in (old, new)), strict=True
     )
@@ -766,7 +769,8 @@ def diff(
         second,
         domain=auditing.joined_domain(first, second, limits or {}, rows),
         rows=rows,
-        settings=settings or auditing.AuditSettings(budget_s=budget_s),
+        settings=settings or auditing.AuditSettings(budget_s=budget),
+        budget=auditing.Budget(int(min(budget, 1e9) * 1e6)),
         report=progress or auditing.silent,
         files=(files[0], files[1]),
         data=source,

@@ -1,3 +1,4 @@
+from .decide import Budget as Budget
 from .diff.decisions import all_inputs as all_inputs
 from .diff.decisions import silent as silent
 from .diff.difference_records import Change as Change

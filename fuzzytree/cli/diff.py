@@ -38,7 +38,7 @@ class DiffOptions(TableOptions, FullResultOptions):
         "Range, or NAME=CATEGORY,..., of an input to compare on (repeat).",
     )
     budget: float = option(
-        "--budget SECONDS", "Time limit of the proofs in seconds.", default=60.0
+        "--budget STEPS", "Limit of the proofs in millions of steps.", default=60.0
     )
     allow_loss: bool = allow_loss_option
 
@@ -68,7 +68,7 @@ def command(options: DiffOptions) -> int:
             new,
             data=table_source(options.data, options),
             limits=limits_of(options.limits),
-            budget_s=options.budget,
+            budget=options.budget,
             allow_loss=options.allow_loss,
             progress=show,
         )

@@ -104,7 +104,7 @@ def test_quiet_says_nothing_of_equal_models_and_the_verdict_of_others(
         ),
         (
             ("grip.yaml", "--budget", "0"),
-            "the budget must be above 0 seconds, not 0.0",
+            "the budget must be above 0 million steps, not 0.0",
         ),
         (
             ("grip.yaml", "--data", "nothing.csv"),

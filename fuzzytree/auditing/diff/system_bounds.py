@@ -233,7 +233,7 @@ def _linear_span(
         side = domain.side(name)
         if side is None:
             return None
-        ends = sorted((weight * Fraction(side.low), weight * Fraction(side.high)))
+        ends = sorted(weight * end for end in side.ends)
         low, high = low + ends[0], high + ends[1]
     return low, high
 

@@ -461,8 +461,8 @@ def test_wrong_limits_and_tables_are_refused() -> None:
         "(did you mean 'force'?)"
     )
     with pytest.raises(ValueError) as caught:  # noqa: PT011 - the text is compared
-        ft.diff(grip(), grip(), budget_s=0.0)
-    assert str(caught.value) == "the budget must be above 0 seconds, not 0.0"
+        ft.diff(grip(), grip(), budget=0.0)
+    assert str(caught.value) == "the budget must be above 0 million steps, not 0.0"
     with pytest.raises(TableError) as missing:
         ft.diff(
             grip(), grip(), data=ft.table(np.zeros((0, 2)), columns=["force", "slip"])
