@@ -99,7 +99,7 @@ class Agreement:
         self.groups = range(count), range(count, self.base.count)
         self._below: dict[tuple[str, Degree, Degree], bool] = {}
         self._full: bool | None = None
-        self._decides: dict[tuple[int, int | None, bool], Answer] = {}
+        self._answers: dict[Question, Answer] = {}
 
     # --- at a point
 
@@ -256,13 +256,12 @@ class Agreement:
     ) -> states.Witness | Proved | Open:
         if not left:
             return Proved("")
-        solver = solver_for(self.base)
         steps = [self._by_boxes, self._by_solver]
-        if self.base.is_lattice and solver is not None:
+        if self.base.is_lattice and self.is_made_of_lines:
             steps.reverse()
-        why = ""
+        whys: list[str] = []
         for step in steps:
-            result = step(left, solver, budget, is_strict)
+            result = step(left, budget, is_strict)
             if isinstance(result, Point):
                 witness = self.difference(result.values)
                 if witness is not None:
@@ -270,8 +269,8 @@ class Agreement:
                 result = Open("classes tie, or no row is known to have the point")
             if isinstance(result, Proved):
                 return result
-            why = result.why
-        return Open(why)
+            whys.append(result.why)
+        return Open("; ".join(whys))
 
     # --- one pair
 
@@ -302,7 +301,10 @@ class Agreement:
             gap = Question(weak=tuple(range(self.base.count)), level=ZERO)
             return self._ask(gap, budget)
         for side, place in enumerate(pair):
-            answer = self._deciding(side, place, budget, is_strict=is_strict)
+            question = Question(weak=(*self.groups[side],), level=ZERO)
+            if place is not None:
+                question = Question((place,), *self.rivals(place, is_strict=is_strict))
+            answer = self._ask(question, budget)
             if isinstance(answer, Proved):
                 return answer
         if i is None or j is None:
@@ -325,24 +327,14 @@ class Agreement:
         """Ask the decider, with a small budget: there are many pairs."""
         few = Budget(min(_QUICK, budget.left), budget)
         decider = self.ones if question.level == ONE else self.decider
-        try:
-            return decider.ask(question, few)
-        except OutOfStepsError:
-            if budget.is_spent:
-                raise
-            return Open("the budget of a pair was spent")
-
-    def _deciding(
-        self, side: int, place: int | None, budget: Budget, *, is_strict: bool
-    ) -> Answer:
-        """Return where a rule, or that none fires, decides in its own model."""
-        key = side, place, is_strict
-        if key not in self._decides:
-            question = Question(weak=(*self.groups[side],), level=ZERO)
-            if place is not None:
-                question = Question((place,), *self.rivals(place, is_strict=is_strict))
-            self._decides[key] = self._ask(question, budget)
-        return self._decides[key]
+        if question not in self._answers:
+            try:
+                self._answers[question] = decider.ask(question, few)
+            except OutOfStepsError:
+                if budget.is_spent:
+                    raise
+                self._answers[question] = Open("the budget of a pair was spent")
+        return self._answers[question]
 
     def _is_ruled_out(self, pair: Pair, *, is_strict: bool) -> bool:
         """Return whether each would have to be stronger than the other."""
@@ -404,14 +396,12 @@ class Agreement:
     # --- several pairs
 
     def _by_boxes(
-        self, pairs: Sequence[Pair], _: object, budget: Budget, is_strict: bool
+        self, pairs: Sequence[Pair], budget: Budget, is_strict: bool
     ) -> Answer:
         base = self.base
-        single = {side: {pair[side] for pair in pairs} for side in (0, 1)}
         rivals = {
             k: [[*of] for of in self.rivals(k, is_strict=is_strict)]
-            for k in {k for both in single.values() for k in both} - {None}
-            if k is not None
+            for k in {k for pair in pairs for k in pair if k is not None}
         }
 
         def is_excluded(boxes: Boxes) -> BoolArray:
@@ -436,12 +426,9 @@ class Agreement:
         return search_boxes(base.fine, is_excluded, accepts, budget)
 
     def _by_solver(
-        self,
-        pairs: Sequence[Pair],
-        solver: Solver | None,
-        budget: Budget,
-        is_strict: bool,
+        self, pairs: Sequence[Pair], budget: Budget, is_strict: bool
     ) -> Answer:
+        solver = solver_for(self.base)
         if solver is None:
             return Open("z3 is not installed, which might decide it")
         open_ = 0
