@@ -21,14 +21,14 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from fuzzytree.auditing.decide.answers import ONE, ZERO
-from fuzzytree.auditing.decide.rules import Literal
-from fuzzytree.auditing.engine.lines import (
+from fuzzytree.auditing.decide.lines import (
     Between,
     Hedged,
     Lines,
     degree_within,
     lines_of,
 )
+from fuzzytree.auditing.decide.rules import Literal
 from fuzzytree.model import Curve, IntArray, MembershipFunction
 from fuzzytree.numerics import degree_between
 

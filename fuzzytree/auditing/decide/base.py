@@ -17,9 +17,9 @@ from fuzzytree.auditing.decide.axes import (
     Axis,
     literal_bounds,
 )
+from fuzzytree.auditing.decide.lines import Lines
 from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, Literal, rules_of
 from fuzzytree.auditing.engine.domain import Domain, combined
-from fuzzytree.auditing.engine.lines import Lines
 from fuzzytree.model import BoolArray, Document, FloatArray, Variable
 
 SAMPLES = 4096

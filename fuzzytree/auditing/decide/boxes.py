@@ -26,8 +26,8 @@ from fuzzytree.auditing.decide.answers import (
 )
 from fuzzytree.auditing.decide.axes import Axis
 from fuzzytree.auditing.decide.base import Base
+from fuzzytree.auditing.decide.lines import Lines
 from fuzzytree.auditing.decide.rules import Literal
-from fuzzytree.auditing.engine.lines import Lines
 from fuzzytree.model import BoolArray, FloatArray
 
 Side = Choice[0, 1]

@@ -17,7 +17,7 @@ import msgspec
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.answers import ONE
-from fuzzytree.auditing.engine.lines import Hedged
+from fuzzytree.auditing.decide.lines import Hedged
 from fuzzytree.model import (
     And,
     Condition,

@@ -17,7 +17,7 @@ from fuzzytree.auditing.decide.answers import (
 )
 from fuzzytree.auditing.decide.axes import Axis
 from fuzzytree.auditing.decide.base import Base
-from fuzzytree.auditing.engine.lines import Lines
+from fuzzytree.auditing.decide.lines import Lines
 
 RESOURCES = 1_000_000
 """What z3 may use for a question, in its own unit, which no clock changes."""

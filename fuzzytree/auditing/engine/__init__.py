@@ -10,7 +10,6 @@ Terms
     - `clock`: a budget of time, and how it is shared
 
 Degrees along an axis
-    - `lines`: as straight lines in fractions; other functions between two of them
     - `measures`: heights, areas, overlaps, distances
     - `polynomials`, `pieces`: membership functions as polynomials, and bounds of
       degrees by doubles

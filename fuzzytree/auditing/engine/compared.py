@@ -18,6 +18,7 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
+from fuzzytree.auditing.decide.lines import Lines, at_knots, together
 from fuzzytree.auditing.engine.arrangement import Arrangement, strengths_at
 from fuzzytree.auditing.engine.bounding import highest_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
@@ -33,7 +34,6 @@ from fuzzytree.auditing.engine.levels import (
     levels_of,
     runs,
 )
-from fuzzytree.auditing.engine.lines import Lines, at_knots, together
 from fuzzytree.auditing.engine.measures import Bounds, largest_gap
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.states import (

@@ -28,10 +28,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple, TypeVar
 
-from fuzzytree.auditing.engine.arrangement import Arrangement, RuleAxis
-from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.domain import Point, variable_value
-from fuzzytree.auditing.engine.lines import (
+from fuzzytree.auditing.decide.lines import (
     Between,
     Lines,
     combined,
@@ -39,6 +36,9 @@ from fuzzytree.auditing.engine.lines import (
     lines_of,
     meetings,
 )
+from fuzzytree.auditing.engine.arrangement import Arrangement, RuleAxis
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+from fuzzytree.auditing.engine.domain import Point, variable_value
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.states import Span
 from fuzzytree.auditing.engine.witnesses import AxisStretch, coupled, point_with

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.lines import (
+from fuzzytree.auditing.decide.lines import (
     Between,
     Lines,
     at_knots,

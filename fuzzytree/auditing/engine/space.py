@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fuzzytree.auditing.decide.lines import together
 from fuzzytree.auditing.engine.arrangement import Arrangement
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.levels import LevelAxis, levels_of
 from fuzzytree.auditing.engine.linear import feasible, row_of
-from fuzzytree.auditing.engine.lines import together
 from fuzzytree.auditing.engine.pieces import bends, proposition_ranges
 from fuzzytree.model import (
     Proposition,

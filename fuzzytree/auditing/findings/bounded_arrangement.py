@@ -20,6 +20,7 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
+from fuzzytree.auditing.decide.lines import Between
 from fuzzytree.auditing.engine.arrangement import Arrangement, arrange
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.compared import (
@@ -28,7 +29,6 @@ from fuzzytree.auditing.engine.compared import (
     RuleDistance,
     RulePairs,
 )
-from fuzzytree.auditing.engine.lines import Between
 from fuzzytree.auditing.engine.measures import Bounds, are_apart
 from fuzzytree.auditing.engine.questions import below, least_cover, uncovered, wins
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness

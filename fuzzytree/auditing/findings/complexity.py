@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.lines import combined, constant, lines_of
+from fuzzytree.auditing.decide.lines import combined, constant, lines_of
 from fuzzytree.auditing.engine.measures import Bounds, integral
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.states import Computed

@@ -1,7 +1,7 @@
 """Bounds of curves that are not polynomial: lines of points below and above them.
 
 The engine encloses any membership function, and what hedges make of it, between two
-functions of straight lines (`fuzzytree.auditing.engine.lines`). Here these are points,
+functions of straight lines (`fuzzytree.auditing.decide.lines`). Here these are points,
 as terms of rules have them, *lower* <= curve <= *upper* on all of a range; degrees are
 rounded downwards in the lower line and upwards in the upper one.
 """
@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Final, Literal, NamedTuple
 
-from fuzzytree.auditing.engine.lines import APART, Hedged, Lines, lines_of
+from fuzzytree.auditing.decide.lines import APART, Hedged, Lines, lines_of
 from fuzzytree.auditing.engine.pieces import RuleCurve
 from fuzzytree.model import MOST_POINTS, Curve, Formula, Hedge, Points, Shape
 from fuzzytree.numerics import outwards

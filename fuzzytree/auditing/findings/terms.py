@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 
 from msgspec.structs import replace
 
+from fuzzytree.auditing.decide.lines import lines_of
 from fuzzytree.auditing.engine.domain import span
-from fuzzytree.auditing.engine.lines import lines_of
 from fuzzytree.auditing.engine.measures import (
     Bounds,
     CurveAxis,

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from fuzzytree.auditing.decide import Base, Boxes, Literal
-from fuzzytree.auditing.engine.lines import Between
+from fuzzytree.auditing.decide.lines import Between
 from fuzzytree.auditing.require.bounds import Bounds, exact, largest
 from fuzzytree.numerics import outwards
 from fuzzytree.semantics import jet

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.lines import APART
+from fuzzytree.auditing.decide.lines import APART
 from fuzzytree.auditing.findings.curve_bounds import (
     CurveBounds,
     complement,

@@ -8,7 +8,7 @@ from typing import get_args
 
 import pytest
 
-from fuzzytree.auditing.engine.lines import APART, Between, Hedged, lines_of
+from fuzzytree.auditing.decide.lines import APART, Between, Hedged, lines_of
 from fuzzytree.model import (
     LR,
     Curve,
