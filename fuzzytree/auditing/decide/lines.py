@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple
 
-from fuzzytree.auditing.engine.pieces import ONE, ZERO, RuleCurve
+from fuzzytree.auditing.decide.answers import ONE, ZERO
 from fuzzytree.model import (
     LR,
     Band,
@@ -352,13 +352,15 @@ def _limit(
 ) -> tuple[Fraction, Fraction]:
     """Return bounds of the limit at a place, from the right (1) or the left (-1).
 
-    Polynomial functions have exact ones. Of the others some jump, but from 0 to 1.
+    LR sets do not jump; bands and points jump behind a value. Of the others some do,
+    but from 0 to 1.
     """
     if isinstance(function, Hedged):
         return _changed(function, _limit(function.function, x, to))
+    if isinstance(function, Band | Points) and to > 0:
+        return _rounded(lines_of(function, x, x + 1).lower.after[0])
     if isinstance(function, LR | Band | Points):
-        curve = RuleCurve(function)
-        return _rounded(curve.degree_after(x) if to > 0 else curve.degree(x))
+        return _rounded(exact_degree(function, x))
     at = degree_within(function, x)
     if x != Fraction(float(x)):
         return at

@@ -11,6 +11,7 @@ import pytest
 from fuzzytree.auditing.decide.lines import APART, Between, Hedged, lines_of
 from fuzzytree.model import (
     LR,
+    Band,
     Curve,
     Gaussian,
     Hedge,
@@ -21,7 +22,7 @@ from fuzzytree.model import (
     Sigmoid,
     SigmoidProduct,
 )
-from fuzzytree.numerics import degree_between
+from fuzzytree.numerics import degree_between, exact_degree
 from fuzzytree.semantics.inference.degrees import hedged
 
 LOW, HIGH = Fraction(-3), Fraction(4)
@@ -80,3 +81,25 @@ def test_a_curve_of_any_steepness_has_lines(slope: float) -> None:
         assert true is not None
         assert lines.lower.value(x) <= true.high
         assert lines.upper.value(x) >= true.low
+
+
+@pytest.mark.parametrize(
+    "inner",
+    [
+        Points((0.0, 0.0, 1.0, 1.0), (0.25, 1.0, 1.0, 0.5)),
+        Band(0.0, 1.0),
+        Band(0.0, 1.0, left=-1.0, right=3.0),
+    ],
+)
+def test_both_limits_are_met_where_a_function_within_hedges_may_jump(
+    inner: Band | Points,
+) -> None:
+    lines, tiny = lines_of(Hedged(inner, 1.0, ("not",)), LOW, HIGH), Fraction(1, 10**9)
+    for x in (Fraction(0), Fraction(1)):
+        place = lines.lower.x.index(x)
+        for limit, near in (("before", x - tiny), ("after", x + tiny)):
+            number = place - (limit == "before")
+            low, high = (getattr(one, limit)[number] for one in lines)
+            degree = 1 - exact_degree(inner, near)
+            assert low - 10 * tiny <= degree <= high + 10 * tiny
+            assert high - low <= APART
