@@ -9,8 +9,8 @@ Terms
     - `domain`: the box, and the values of variables on it
     - `clock`: a budget of time, and how it is shared
 
-Degrees along an axis
-    - `measures`: heights, areas, overlaps, distances
+Degrees along an axis (as lines: `fuzzytree.auditing.decide`)
+    - `measures`: distances of functions of lines
     - `polynomials`, `pieces`: membership functions as polynomials, and bounds of
       degrees by doubles
 

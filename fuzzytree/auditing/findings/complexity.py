@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from fractions import Fraction
 
-from fuzzytree.auditing.decide.lines import combined, constant, lines_of
-from fuzzytree.auditing.engine.measures import Bounds, integral
-from fuzzytree.auditing.engine.pieces import ONE, ZERO
+from fuzzytree.auditing.decide.answers import ONE, ZERO
+from fuzzytree.auditing.decide.lines import combined, constant
+from fuzzytree.auditing.decide.measures import Bounds, integral
 from fuzzytree.auditing.engine.states import Computed
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges, used_terms
 from fuzzytree.model import depth
-from fuzzytree.numerics import exact_degree
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
@@ -99,12 +98,6 @@ def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
     )
 
 
-def _covered(degrees: Sequence[Fraction]) -> Fraction:
-    """Return h of the degrees of one value, as `nauck` defines it."""
-    total = sum(degrees, ZERO)
-    return total if total <= 1 else (len(degrees) - total) / (len(degrees) - 1)
-
-
 def coverage(of: VariableRange) -> Bounds:
     """Return the mean of h(x) over a range, as `nauck` defines it.
 
@@ -112,30 +105,23 @@ def coverage(of: VariableRange) -> Bounds:
         >>> from fuzzytree.model.rulebase import Points, Term, Variable
         >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
         >>> both = Variable("x", (Term("low", down), Term("high", up)))
-        >>> coverage(VariableRange(both, Fraction(0), Fraction(1), False)).exact
-        '1'
+        >>> coverage(VariableRange(both, Fraction(0), Fraction(1), False)).low
+        Fraction(1, 1)
     """
-    if of.values:
-        h = [
-            _covered([exact_degree(t.shape, x) for t in of.variable.terms])
-            for x in of.values
-        ]
-        mean = sum(h, ZERO) / len(h)
-        return Bounds(mean, mean)
-    curves = [lines_of(term.shape, of.low, of.high) for term in of.variable.terms]
+    curves = [of.lines(term.shape) for term in of.variable.terms]
+    low, high = curves[0].lower.x[0], curves[0].lower.x[-1]
     count = len(curves)
-    level = constant(ONE, of.low, of.high)
+    level = constant(ONE, low, high)
     totals: list[Fraction] = []
     for side in (0, 1):
         summed = combined([one[side] for one in curves], lambda both: both[0] + both[1])
         total = integral(combined([summed, level], min))
         if count > 1:  # what is above 1 is taken off; two terms or more are needed
-            over = integral(combined([summed, level], max)) - (of.high - of.low)
+            over = integral(combined([summed, level], max)) - (high - low)
             total -= over / (count - 1)
         totals.append(total)
     # Where degrees are enclosed, h differs by no more than their sum does.
     slack = sum((integral(c.upper) - integral(c.lower) for c in curves), ZERO) / 2
     total = sum(totals, ZERO) / 2
-    width = of.high - of.low
-    low, high = max(total - slack, ZERO), min(total + slack, width)
-    return Bounds(low / width, high / width)
+    width = high - low
+    return Bounds(max(total - slack, ZERO) / width, min((total + slack) / width, ONE))

@@ -15,7 +15,7 @@ from fractions import Fraction
 from typing import Final, Literal, NamedTuple
 
 from fuzzytree.auditing.decide.lines import APART, Hedged, Lines, lines_of
-from fuzzytree.auditing.engine.pieces import RuleCurve
+from fuzzytree.auditing.decide.measures import curve_distance
 from fuzzytree.model import MOST_POINTS, Curve, Formula, Hedge, Points, Shape
 from fuzzytree.numerics import outwards
 
@@ -119,17 +119,9 @@ def _mapped(
 @functools.lru_cache(maxsize=256)
 def gap(bounds: CurveBounds, of: Interval) -> Fraction:
     """Return how far two lines are apart at most on a range."""
-    low, high = of
-    apart = Fraction(0)
-    lines = RuleCurve(bounds.lower), RuleCurve(bounds.upper)
-    for shape in (bounds.lower, bounds.upper):
-        if isinstance(shape, Points):
-            inner = (Fraction(x) for x in shape.values)
-            for x in (low, *(x for x in inner if low <= x <= high), high):
-                lower, upper = (line.degree(x) for line in lines)
-                behind = [line.degree_after(x) for line in lines]
-                apart = max(apart, abs(upper - lower), abs(behind[1] - behind[0]))
-    return apart
+    if bounds.is_exact:
+        return Fraction(0)
+    return curve_distance(bounds.lower, bounds.upper, *of).high
 
 
 def _points(lines: Lines, side: Side) -> Points:

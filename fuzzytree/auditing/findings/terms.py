@@ -12,23 +12,25 @@ from typing import Final, NamedTuple
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.decide.lines import lines_of
-from fuzzytree.auditing.engine.domain import span
-from fuzzytree.auditing.engine.measures import (
+from fuzzytree.auditing.decide.answers import ONE, ZERO
+from fuzzytree.auditing.decide.lines import (
+    Between,
+    Lines,
+    combined,
+    constant,
+    lines_of,
+)
+from fuzzytree.auditing.decide.measures import (
     Bounds,
-    CurveAxis,
-    Excess,
     Overlap,
     area,
-    curve_axis,
     dips,
-    excesses,
-    heights,
+    height,
     most_shared,
     overlap,
     walk,
 )
-from fuzzytree.auditing.engine.pieces import pieces
+from fuzzytree.auditing.engine.domain import span
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Computed,
@@ -46,7 +48,17 @@ from fuzzytree.auditing.findings.records import (
     TermName,
 )
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model import LR, Points, RuleBase, Shape, Term, Variable, questions
+from fuzzytree.model import (
+    LR,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    Term,
+    Variable,
+    checkpoint,
+    questions,
+)
 from fuzzytree.numerics import exact_degree, outwards
 from fuzzytree.rechecking import listed
 
@@ -60,10 +72,27 @@ class VariableRange(NamedTuple):
     is_open: bool
     values: Sequence[Fraction] = ()  # of rows, one by one; empty of numbers
 
-    def line(self, *terms: Term) -> CurveAxis:
-        """Return the curves of some terms on the range."""
-        shapes = [term.shape for term in terms]
-        return curve_axis(shapes, self.low, self.high, is_open=self.is_open)
+    def lines(self, shape: Shape) -> Between:
+        """Return a curve as lines; of single values each is level for a length of 1.
+
+        Where the least value is left out the limit stands for it.
+        """
+        if self.values:
+            degrees = tuple(exact_degree(shape, x) for x in self.values)
+            x = tuple(map(Fraction, range(len(degrees) + 1)))
+            lines = Lines(x, (*degrees, degrees[-1]), degrees, degrees)
+            return Between(lines, lines)
+        lower, upper = result = lines_of(shape, self.low, self.high)
+        if not self.is_open:
+            return result
+        opened = lower._replace(at=(*lower.after[:1], *lower.at[1:]))
+        if result.is_exact:
+            return Between(opened, opened)
+        return Between(opened, upper._replace(at=(*upper.after[:1], *upper.at[1:])))
+
+    def value(self, place: Fraction) -> Fraction:
+        """Return the value at a place of the lines."""
+        return self.values[int(place)] if self.values else place
 
 
 def ranges(subject: Subject) -> tuple[VariableRange, ...]:
@@ -110,9 +139,10 @@ def _own_terms(subject: Subject, variable: Variable) -> Iterator[Term]:
             yield from (term for term in variable.terms if term.name in names)
 
 
-def measure(name: str, value: Bounds, unit: str = "") -> Measure:
-    """Return a number between bounds as a measure."""
-    return Measure(name, value.nearest, value.exact, unit)
+def measure(name: str, value: Bounds) -> Measure:
+    """Return a number between bounds as a measure: their middle."""
+    exact = str(value.low) if value.low == value.high else None
+    return Measure(name, float((value.low + value.high) / 2), exact)
 
 
 def term_name(variable: Variable, term: Term) -> str:
@@ -142,19 +172,15 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Audit
         for term in of.variable.terms:
             subject.clock.check()
             lines = bounds.get((of.variable.name, term.name))
-            axis = of.line(term)
-            ((height, at),) = heights(axis)
-            if of.values:
-                height, at = _height_of_values(of, term)
+            (low, high), at = height(of.lines(term.shape))
             if lines is not None:
-                upper = of.line(Term(term.name, lines.upper))
-                height = Bounds(height.low, heights(upper)[0][0].high)
-            if height.low >= level:
-                clean, lowest = clean + 1, min(lowest, height.low)
-            elif lines is not None and height.high:
-                yield _low_curve(of, term, height, is_low=height.high < level)
+                high = height(of.lines(lines.upper))[0].high
+            if low >= level:
+                clean, lowest = clean + 1, min(lowest, low)
+            elif high and (lines is not None or low < high):
+                yield _low_curve(of, term, Bounds(low, high), is_low=high < level)
             else:
-                yield _low_term(of, term, height, at, axis.pieces)
+                yield _low_term(of, term, Bounds(low, high), of.value(at))
     if clean:
         proof = Proved(f"the height of {clean} terms was found")
         measures = (Measure("lowest height", float(lowest), str(lowest)),)
@@ -164,30 +190,20 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Audit
         )
 
 
-def _height_of_values(of: VariableRange, term: Term) -> tuple[Bounds, Fraction]:
-    """Return the largest degree of the values of rows, and the first with it."""
-    degrees = [exact_degree(term.shape, value) for value in of.values]
-    most = max(degrees)
-    return Bounds(most, most), of.values[degrees.index(most)]
-
-
-def _low_term(
-    of: VariableRange, term: Term, height: Bounds, at: Fraction, cells: int
-) -> AuditAnswer:
-    how = f"its curve was visited in {counted(cells, 'stretch', 'stretches')}, in each "
-    how += "of which it is monotone"
-    message = "FT401.low" if height.high else "FT401.empty"
-    facts, height_of = {"at": float(at)}, measure("height", height)
-    return _of_term(message, of, term, Proved(how), facts, height_of)
+def _low_term(of: VariableRange, term: Term, most: Bounds, at: Fraction) -> AuditAnswer:
+    proof = Proved("its degree was evaluated wherever it may be largest")
+    message = "FT401.low" if most.high else "FT401.empty"
+    facts = {"at": float(at)}
+    return _of_term(message, of, term, proof, facts, measure("height", most))
 
 
 def _low_curve(
-    of: VariableRange, term: Term, height: Bounds, *, is_low: bool
+    of: VariableRange, term: Term, most: Bounds, *, is_low: bool
 ) -> AuditAnswer:
     """Return that a curve between bounds is hardly reached, or may be."""
     name = term_name(of.variable, term)
-    low, high = outwards(height.low)[0], outwards(height.high)[1]
-    why = "its curve is known between two lines of points"
+    low, high = outwards(most.low)[0], outwards(most.high)[1]
+    why = "its curve is known between two functions of lines"
     state = Bracket(f"the largest degree of {name}", low, high, why)
     measures = Measure("height at least", low), Measure("height at most", high)
     message = "FT401.low-curve" if is_low else "FT401.open"
@@ -211,6 +227,22 @@ def _of_term(
         measures=measures,
         facts={"low": float(of.low), "high": float(of.high), **facts},
     )
+
+
+def _along(
+    message: str,
+    of: VariableRange,
+    term: Term,
+    state: State,
+    ends: tuple[Fraction, Fraction],
+    facts: Mapping[str, FactValue],
+    measures: Sequence[Measure],
+) -> AuditAnswer:
+    """Return an answer about a term on a part of its range."""
+    low, high = map(float, ends)
+    facts = {"low": low, "high": high, **facts}
+    answer = _of_term(message, of, term, state, facts, *measures)
+    return replace(answer, region=(Span(of.variable.name, low, high),))
 
 
 # --- FT404: is it used?
@@ -305,8 +337,7 @@ def shape_answers(subject: Subject) -> Iterator[AuditAnswer]:
 def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
     """Yield the defects of a term's shape, None for each too small one."""
     if not of.values:
-        for excess in excesses(term.shape, of.low, of.high):
-            yield _excess(of, term, excess) if excess.depth >= SHALLOW else None
+        yield from _excesses(of, term)
         yield from _dips(of, term)
     if isinstance(term.shape, Points) and max(term.shape.degrees) < 1.0:
         yield _subnormal(of, term, max(term.shape.degrees))
@@ -315,38 +346,71 @@ def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
         yield _outlying(of, term, share)
 
 
-def _excess(of: VariableRange, term: Term, excess: Excess) -> AuditAnswer:
-    message = "FT402.above" if excess.is_above else "FT402.below"
-    how = Computed("the polynomial was evaluated in fractions, along all pieces")
-    depth = Measure("excess", float(excess.depth))
-    at = Measure("place of the excess", float(excess.at), unit=of.variable.unit)
-    ends = {"low": float(excess.low), "high": float(excess.high)}
-    span = Span(of.variable.name, ends["low"], ends["high"])
-    return replace(_of_term(message, of, term, how, ends, depth, at), region=(span,))
+_SAMPLES: Final = 256  # of the polynomial of a side
+
+
+def _excesses(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
+    """Yield where the polynomials of an LR set leave [0, 1] before they are clipped."""
+    if not isinstance(term.shape, LR):
+        return
+    mean = Fraction(term.shape.mean)
+    for side, sign in ((term.shape.left, -1), (term.shape.right, 1)):
+        spread = sign * Fraction(side.spread)
+        ends = sorted((mean, mean + spread))
+        low, high = max(ends[0], of.low), min(ends[1], of.high)
+        if low >= high:
+            continue
+        checkpoint()
+        x = tuple(low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
+        values = [_polynomial(side, (one - mean) / spread) for one in x]
+        above, below = [value - 1 for value in values], [-value for value in values]
+        for message, over in (("FT402.above", above), ("FT402.below", below)):
+            lines = Lines(x, (*over,), (*over[:-1],), (*over[1:],))
+            cut = combined([lines, constant(ZERO, low, high)], max)
+            for depth, run in itertools.groupby(cut.pieces(), lambda one: any(one[2:])):
+                if depth:
+                    yield _excess(of, term, message, [*run])
+
+
+def _polynomial(side: Side, t: Fraction) -> Fraction:
+    """Return the degree of a side up to its spread, as if it were not clipped."""
+    total = ZERO
+    for coefficient in reversed(side.curve):
+        total = total * (2 * t - 1) + Fraction(coefficient)
+    return 1 - t * total
+
+
+def _excess(
+    of: VariableRange, term: Term, message: str, run: Sequence[tuple[Fraction, ...]]
+) -> AuditAnswer | None:
+    depth, at = max((most, -x) for a, b, p, q in run for most, x in ((p, a), (q, b)))
+    if depth < SHALLOW:
+        return None
+    how = Computed("the polynomial was evaluated in fractions")
+    measures = (
+        Measure("excess", float(depth)),
+        Measure("place of the excess", float(-at), unit=of.variable.unit),
+    )
+    return _along(message, of, term, how, (run[0][0], run[-1][1]), {}, measures)
 
 
 def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
-    axis = of.line(term)
-    walked = [*walk(axis, 0)]
-    deep = [*dips(walked, SHALLOW)]
-    smaller = [*dips(walked, Fraction(1, 10**12))]
-    yield from [None] * (len(smaller) - len(deep))
+    walked = walk(of.lines(term.shape))
+    deep = dips(walked, SHALLOW)
+    yield from [None] * (len(dips(walked, Fraction(1, 10**12))) - len(deep))
     if not deep:
         return
     depths = [min(a.low, c.low) - b.high for (a, _), (b, _), (c, _) in deep]
     depth = max(depths)
     (_, left), (bottom, valley), (_, right) = deep[depths.index(depth)]
-    how = f"its curve was evaluated at the ends of {axis.pieces} parts"
+    how = Proved("its curve was evaluated at the ends of all its lines")
     measures = (
         Measure("peaks", len(deep) + 1),
         Measure("depth of the deepest dip", float(depth)),
         Measure("place of the deepest dip", float(valley), unit=of.variable.unit),
     )
-    ends = {"low": float(left), "high": float(right)}
-    span = Span(of.variable.name, ends["low"], ends["high"])
-    facts = {**ends, "bottom": bottom.nearest}
-    answer = _of_term("FT402.peaks", of, term, Proved(how), facts, *measures)
-    yield replace(answer, region=(span,))
+    facts = {"bottom": float((bottom.low + bottom.high) / 2)}
+    yield _along("FT402.peaks", of, term, how, (left, right), facts, measures)
 
 
 def _subnormal(of: VariableRange, term: Term, most: float) -> AuditAnswer:
@@ -367,32 +431,23 @@ def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
     Returns:
         None if the curve has no end, or no area, or the range is a point.
     """
-    laid = pieces(shape)
-    first, last = laid[0], laid[-1]
-    if first.high is None or last.low is None or of.low == of.high:
+    knots = [Fraction(knot) for knot in shape.knots()]
+    if len(set(knots)) < 2 or of.low == of.high:
         return None
-    if any(first.polynomial) or any(last.polynomial):
+    first, last = min(knots), max(knots)
+    if any(exact_degree(shape, beyond) for beyond in (first - 1, last + 1)):
         return None
-    if first.high == last.low:
-        return None
-    parts: list[Bounds] = []
-    for low, high in (
-        (max(first.high, of.low), min(last.low, of.high)),
-        (first.high, last.low),
-    ):
-        is_empty = low >= high
-        zero = Bounds(Fraction(0), Fraction(0))
-        parts.append(zero if is_empty else area(lines_of(shape, low, high)))
-    part, whole = parts
-    if whole.low <= 0:
-        return None
-    return Bounds(part.low / whole.high, min(part.high / whole.low, Fraction(1)))
+    part, (low, high) = Bounds(ZERO, ZERO), area(lines_of(shape, first, last))
+    if first < of.high and of.low < last:
+        inside = lines_of(shape, max(first, of.low), min(last, of.high))
+        part = area(inside)
+    return Bounds(part.low / high, min(part.high / low, ONE)) if low > 0 else None
 
 
 MOST_SHOWN: Final = 20
 """The most pairs of terms that are listed one by one."""
 
-_MOST_PIECES = 4_000  # of two curves whose overlap is computed
+_MOST_KNOTS: Final = 4_000  # of two curves whose overlap is computed
 
 
 def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
@@ -401,71 +456,33 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
     overlaps: list[tuple[Fraction, AuditAnswer]] = []
     apart = points = 0
     for of in ranges(subject):
-        terms = of.variable.terms
-        shapes = [term.shape for term in terms]
-        most = most_shared(shapes, float(of.low), float(of.high))
-        for a, b in itertools.combinations(range(len(terms)), 2):
-            if most[a, b] < limit and not of.values:
+        curves = [(term, of.lines(term.shape)) for term in of.variable.terms]
+        most = most_shared([lines for _, lines in curves])
+        for a, b in itertools.combinations(range(len(curves)), 2):
+            if most[a, b] < limit:
                 apart += 1
                 continue
             subject.clock.check()
-            one, other = terms[a], terms[b]
-            if len(pieces(one.shape)) + len(pieces(other.shape)) > _MOST_PIECES:
+            (one, mine), (other, theirs) = curves[a], curves[b]
+            if len(one.shape.knots()) + len(other.shape.knots()) > _MOST_KNOTS:
                 yield _too_large(of, one, other)
                 continue
-            if of.values:
-                shared = overlap_of_values(one.shape, other.shape, of.values)
-            else:
-                shared = overlap(of.line(one, other))
-            jaccard = shared.jaccard
-            if jaccard is None:
+            shared = overlap(mine, theirs)
+            if shared is None:
                 points += 1
-                continue
-            if jaccard.high < limit:
+            elif shared.jaccard.high < limit:
                 apart += 1
-                continue
-            overlaps.append(
-                (-jaccard.low, _overlapping(of, one, other, shared, jaccard, limit))
-            )
+            else:
+                answer = _overlapping(of, one, other, shared, limit)
+                overlaps.append((-shared.jaccard.low, answer))
     overlaps.sort(key=lambda pair: pair[0])
     yield from (answer for _, answer in overlaps[:MOST_SHOWN])
     if overlaps or apart or points:
         yield _other_pairs(len(overlaps), apart, points, float(limit))
 
 
-def overlap_of_values(one: Shape, other: Shape, values: Sequence[Fraction]) -> Overlap:
-    """Return how much two terms share where rows have only some values.
-
-    Each value counts alike: areas are sums over the values.
-
-    Example:
-        >>> from fuzzytree.model import Band
-        >>> both = Band(None, 1.0), Band(0.5, None)
-        >>> overlap_of_values(*both, [*map(Fraction, range(3))]).jaccard
-        Bounds(low=Fraction(1, 3), high=Fraction(1, 3))
-    """
-    pairs = [(exact_degree(one, x), exact_degree(other, x)) for x in values]
-    least = [min(pair) for pair in pairs]
-    shared, joined = sum(least, Fraction(0)), sum(map(max, pairs), Fraction(0))
-    most = max(least)
-    return Overlap(
-        Bounds(shared, shared),
-        Bounds(joined, joined),
-        Bounds(most, most),
-        values[least.index(most)],
-        (),
-        all(a <= b for a, b in pairs),
-        all(a >= b for a, b in pairs),
-    )
-
-
 def _overlapping(
-    of: VariableRange,
-    one: Term,
-    other: Term,
-    shared: Overlap,
-    jaccard: Bounds,
-    limit: Fraction,
+    of: VariableRange, one: Term, other: Term, shared: Overlap, limit: Fraction
 ) -> AuditAnswer:
     name = f"terms {one.name!r} and {other.name!r} of {of.variable.name!r}"
     message, facts = "FT403.similar", dict[str, str]()
@@ -475,35 +492,31 @@ def _overlapping(
         message = "FT403.within"
         inner, outer = (one, other) if shared.is_within else (other, one)
         facts = {"inner": inner.name, "outer": outer.name}
-    state: State = Proved("the areas were integrated in fractions, piece by piece")
-    if jaccard.low < limit:
+    state: State = Proved("the areas were integrated in fractions, line by line")
+    if shared.jaccard.low < limit:
         state = Bracket(
             f"the share of their area that {name} have in common",
-            float(jaccard.low),
-            float(jaccard.high),
-            "the areas end at places that are no fractions",
+            float(shared.jaccard.low),
+            float(shared.jaccard.high),
+            "their curves are known between two functions of lines",
         )
     measures = [
-        measure("shared area by joined area", jaccard),
+        measure("shared area by joined area", shared.jaccard),
         measure("possibility", shared.possibility),
     ]
-    if shared.crossings:
-        at, height = max(shared.crossings, key=lambda pair: pair[1].low)
-        measures.append(measure("crossing height", height))
+    if shared.crossing and not of.values:
+        degree, at = shared.crossing
+        measures.append(measure("crossing height", Bounds(degree, degree)))
         measures.append(Measure("crossing", float(at), unit=of.variable.unit))
+    terms = labels_of(of, one, other)
     return audit_answer(
-        message,
-        name,
-        state,
-        terms=labels_of(of, one, other),
-        measures=tuple(measures),
-        facts=facts,
+        message, name, state, terms=terms, measures=tuple(measures), facts=facts
     )
 
 
 def _too_large(of: VariableRange, one: Term, other: Term) -> AuditAnswer:
     name = f"terms {one.name!r} and {other.name!r} of {of.variable.name!r}"
-    state = Declined("FTD05", f"their curves have more than {_MOST_PIECES} pieces")
+    state = Declined("FTD05", f"their curves have more than {_MOST_KNOTS} pieces")
     terms = labels_of(of, one, other)
     return audit_answer("FT403.declined", name, state, terms=terms)
 

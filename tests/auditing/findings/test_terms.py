@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from fractions import Fraction
 
 import pytest
@@ -28,6 +29,7 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.model.rulebase import Side as Half
+from fuzzytree.numerics import exact_degree
 from tests.auditing.findings.test_views import A_LOW, block_of, system_of
 
 LOW = Term("low", Points((0.0, 1.0, 2.0), (1.0, 1.0, 0.0)))
@@ -142,6 +144,28 @@ def test_a_term_of_a_combination_is_tested_on_all_its_inputs_allow() -> None:
 def test_a_defect_of_shape_is_reported(shape: Shape, text: str) -> None:
     results = found(base(LOW, HIGH, Term("odd", shape)), "FT402")
     assert [answer.sentence for answer in results] == [f"term 'odd' of 'force' {text}"]
+
+
+def test_a_polynomial_is_outside_only_where_its_curve_is_clipped() -> None:
+    chance = random.Random(3)
+    seen = {"FT402.above": 0, "FT402.below": 0}
+    for _ in range(20):
+        halves = (
+            Half(0.8, tuple(chance.uniform(-2.0, 2.0) for _ in range(3)), 1.5)
+            for _ in "lr"
+        )
+        shape = LR(chance.uniform(0.0, 4.0), *halves)
+        for answer in found(base(LOW, Term("odd", shape)), "FT402"):
+            if answer.message in seen:
+                seen[answer.message] += 1
+                (span,) = answer.region
+                assert span.low is not None
+                assert span.high is not None
+                assert span.low <= answer.measures[1].value <= span.high
+                middle = (Fraction(span.low) + Fraction(span.high)) / 2
+                goal = 1 if answer.message == "FT402.above" else 0
+                assert exact_degree(shape, middle) == goal
+    assert min(seen.values()) > 5
 
 
 def test_two_terms_for_one_thing_are_reported_with_their_shared_area() -> None:

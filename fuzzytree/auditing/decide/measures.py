@@ -1,0 +1,230 @@
+"""Measures of degrees along an axis: heights, dips, areas, overlaps, distances.
+
+All are taken from functions of straight lines (`lines`): exact for bands and points,
+between two bounds for curves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from operator import itemgetter
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from fuzzytree.auditing.decide.answers import ONE, ZERO
+from fuzzytree.auditing.decide.lines import (
+    Between,
+    Lines,
+    at_knots,
+    combined,
+    lines_of,
+    together,
+)
+from fuzzytree.model import FloatArray, MembershipFunction
+
+_CELLS: Final = 256  # on which areas are bounded before they are worked out
+_SLACK: Final = 1e-9  # for what rounding takes, on a range of length 1
+
+
+class Bounds(NamedTuple):
+    """Two numbers between which one lies; it is known exactly if they are equal."""
+
+    low: Fraction
+    high: Fraction
+
+
+CurveValue = tuple[Bounds, Fraction]
+"""A value, and a place where a function has it or comes near it."""
+
+
+def integral(lines: Lines) -> Fraction:
+    """Return the area under lines."""
+    return sum(((b - a) * (p + q) / 2 for a, b, p, q in lines.pieces()), start=ZERO)
+
+
+def area(of: Between) -> Bounds:
+    """Return the area under a function."""
+    low = integral(of.lower)
+    return Bounds(low, low if of.is_exact else integral(of.upper))
+
+
+def walk(of: Between) -> list[CurveValue]:
+    """Return a function's values from left to right; at a jump all, with its place."""
+    both = zip(of.lower.at, of.upper.at, strict=True)
+    values = [(x, 1, *ends) for x, ends in zip(of.lower.x, both, strict=True)]
+    if of.is_exact:  # limits; those of an enclosure are no values
+        for a, b, p, q in of.lower.pieces():
+            values += [(a, 2, p, p), (b, 0, q, q)]
+    return [(Bounds(*ends), x) for x, _, *ends in sorted(values)]
+
+
+def height(of: Between) -> CurveValue:
+    """Return the supremum of a function, and the first place where it is near.
+
+    Example:
+        >>> from fuzzytree.model import Points
+        >>> height(lines_of(Points((0.0, 2.0), (0.0, 1.0)), ZERO, ONE))[0].low
+        Fraction(1, 2)
+    """
+    lower, upper = of
+    values = [*zip(lower.at, lower.x, strict=True)]
+    if of.is_exact:
+        values += [one for a, b, p, q in lower.pieces() for one in ((p, a), (q, b))]
+    low, at = max(values, key=lambda one: (one[0], -one[1]))
+    return Bounds(low, low if of.is_exact else upper.highest), at
+
+
+def dips(
+    values: Sequence[CurveValue], least: Fraction
+) -> list[tuple[CurveValue, CurveValue, CurveValue]]:
+    """Return where values fall and rise again, by at least some amount above 0.
+
+    Returns:
+        The peak before, the valley, and the peak behind it.
+
+    Example:
+        >>> walked = [(Bounds(Fraction(v), Fraction(v)), Fraction(k))
+        ...           for k, v in enumerate((0, 3, 1, 2, 0))]
+        >>> [[int(at) for _, at in dip] for dip in dips(walked, Fraction(1, 2))]
+        [[1, 2, 3]]
+    """
+    turns = [values[0]]  # a peak, a valley, a peak and so on
+    for value in values[1:]:
+        rise = value[0].low - turns[-1][0].low
+        farther = rise if len(turns) % 2 else -rise
+        if farther > 0:
+            turns[-1] = value
+        elif -farther >= least:
+            turns.append(value)
+    return [*zip(turns[::2], turns[1::2], turns[2::2], strict=False)]
+
+
+# --- two functions
+
+
+class Overlap(NamedTuple):
+    """How much two functions share."""
+
+    jaccard: Bounds  # the area under both over the area under either
+    possibility: Bounds  # the supremum of their minimum
+    crossing: tuple[Fraction, Fraction] | None  # the highest: the degree, the place
+    is_within: bool  # whether the first is nowhere above the second
+    is_around: bool  # whether the first is nowhere below the second
+
+
+def overlap(one: Between, other: Between) -> Overlap | None:
+    """Return how much two functions share, None if they have no area.
+
+    Example:
+        >>> from fuzzytree.model import Points
+        >>> ramps = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
+        >>> result = overlap(*(lines_of(ramp, ZERO, ONE) for ramp in ramps))
+        >>> result.jaccard.low, result.possibility.low
+        (Fraction(1, 3), Fraction(1, 2))
+    """
+    lower = upper = combined([one.lower, other.lower], min)
+    if not (one.is_exact and other.is_exact):
+        upper = combined([one.upper, other.upper], min)
+    shared = area(Between(lower, upper))
+    sums = map(sum, zip(area(one), area(other), strict=True))
+    least, most = (both - part for both, part in zip(sums, shared, strict=True))
+    if least <= 0:
+        return None
+    return Overlap(
+        Bounds(shared.low / most, min(shared.high / least, ONE)),
+        height(Between(lower, upper))[0],
+        _crossing(one.lower, other.lower),
+        one == other or all(gap <= 0 for gap, _ in _gaps(one.upper, other.lower)),
+        one == other or all(gap <= 0 for gap, _ in _gaps(other.upper, one.lower)),
+    )
+
+
+def _crossing(one: Lines, other: Lines) -> tuple[Fraction, Fraction] | None:
+    """Return the highest place where two functions change their order."""
+    places: list[tuple[Fraction, Fraction]] = []
+    order, last = ZERO, (ZERO, ZERO)
+    for a, b, p, q, r, s in together(one, other):
+        events = [(p - r, p, a), (q - s, q, b)]
+        if (p - r) * (q - s) < 0:
+            share = (p - r) / (p - r - q + s)
+            events.insert(1, (ZERO, p + (q - p) * share, a + (b - a) * share))
+        for gap, *place in events:
+            if gap * order < 0:
+                places.append(last)
+            order, last = gap or order, (place[0], place[1])
+    return max(places, key=itemgetter(0), default=None)
+
+
+def most_shared(curves: Sequence[Between]) -> FloatArray:
+    """Return bounds from above of the shared by the joined area of each two functions.
+
+    On a cell two share no more than the smaller of their areas, and join no less than
+    the larger one. Only what comes near to an answer is worth the exact areas.
+
+    Returns:
+        Shape (functions, functions); 1 where nothing is known.
+    """
+    least, most = (
+        np.array([_cell_areas(of[side]) for of in curves]) for side in (0, 1)
+    )
+    result = np.ones((len(curves), len(curves)))
+    for place in range(len(curves)):
+        shared = np.minimum(most, most[place]).sum(axis=1) + _SLACK
+        joined = np.maximum(least, least[place]).sum(axis=1) - _SLACK
+        np.divide(shared, joined, out=result[place], where=joined > _SLACK)
+    return np.minimum(result, 1.0)
+
+
+def _cell_areas(lines: Lines) -> FloatArray:
+    """Return the area under lines on each of some cells, as if their range were 1."""
+    low, width = lines.x[0], lines.x[-1] - lines.x[0]
+    if not width:
+        return np.zeros(_CELLS)
+    x = np.array([float((knot - low) / width) for knot in lines.x])
+    p, q = (np.array([*map(float, ends)]) for ends in (lines.after, lines.before))
+    size = np.diff(x)
+    start = np.append(0.0, np.cumsum(size * (p + q) / 2.0))
+    edges = np.linspace(0.0, 1.0, _CELLS + 1)
+    k = np.searchsorted(x[1:-1], edges, side="right")
+    part = (edges - x[k]) / np.maximum(size[k], 1e-300)
+    return np.diff(start[k] + (edges - x[k]) * (p[k] + (q[k] - p[k]) * part / 2.0))
+
+
+class CurveDistance(NamedTuple):
+    """The largest difference of two functions."""
+
+    low: Fraction  # it is at least this
+    high: Fraction  # it is at most this
+    at: Fraction  # where it is reached, or approached
+
+
+def curve_distance(
+    one: MembershipFunction, other: MembershipFunction, low: Fraction, high: Fraction
+) -> CurveDistance:
+    """Return how far two membership functions are apart at most between two ends.
+
+    Example:
+        >>> from fuzzytree.model import Points
+        >>> steep, slow = (Points((0.0, end), (0.0, 1.0)) for end in (1.0, 2.0))
+        >>> [str(x) for x in curve_distance(steep, slow, Fraction(0), Fraction(4))]
+        ['1/2', '1/2', '1']
+    """
+    return largest_gap(lines_of(one, low, high), lines_of(other, low, high))
+
+
+def largest_gap(one: Between, other: Between) -> CurveDistance:
+    """Return how far two functions are apart at most."""
+    least = (*_gaps(one.lower, other.upper), *_gaps(other.lower, one.upper))
+    most = (*_gaps(one.upper, other.lower), *_gaps(other.upper, one.lower))
+    high, at = max(most, key=itemgetter(0))
+    return CurveDistance(max(ZERO, *(gap for gap, _ in least)), high, at)
+
+
+def _gaps(one: Lines, other: Lines) -> Iterator[tuple[Fraction, Fraction]]:
+    """Yield by how much a function is above another one, where that can be most."""
+    yield from ((value - rival, x) for x, value, rival in at_knots(one, other))
+    for a, b, p, q, r, s in together(one, other):
+        yield p - r, a
+        yield q - s, b
