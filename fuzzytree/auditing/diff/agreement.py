@@ -204,10 +204,10 @@ class Agreement:
     def _is_full(self, budget: Budget) -> bool:
         """Return whether a rule of strength 1 decides everywhere, in both models."""
         if self._full is None:
-            asked = (Question(rivals=(*g,), level=ONE) for g in self.groups)
+            queries = (Question(rivals=(*g,), level=ONE) for g in self.groups)
             self._full = self.are_trees or (
                 self.is_made_of_lines
-                and all(isinstance(self._ask(q, budget), Proved) for q in asked)
+                and all(isinstance(self._ask(q, budget), Proved) for q in queries)
             )
         return self._full
 
@@ -453,7 +453,7 @@ class Agreement:
                 parts += [terms[k] <= 0 for k in self.groups[side]]
             else:
                 parts.append(terms[place] > 0)
-        asked: set[tuple[int, int]] = set()
+        comparisons: set[tuple[int, int]] = set()
         while True:
             formula = solver.z3.And(*parts)
             answer = solver.ask_formula(formula, lambda _: True, budget)
@@ -471,10 +471,10 @@ class Agreement:
                     more.add((place, max(stronger, key=high.__getitem__)))
             if not more:
                 return answer
-            if more <= asked:
+            if more <= comparisons:
                 return Open("lines around a curve are too far apart")
-            for place, k in more - asked:
+            for place, k in more - comparisons:
                 is_before = is_strict or k < place
                 mine, theirs = terms[place], terms[k]
                 parts.append(mine > theirs if is_before else mine >= theirs)
-            asked |= more
+            comparisons |= more
