@@ -100,6 +100,9 @@ class Agreement:
         self._below: dict[tuple[str, Degree, Degree], bool] = {}
         self._full: bool | None = None
         self._answers: dict[Question, Answer] = {}
+        self._above: dict[int, list[int]] = {}
+        self._rivals: dict[tuple[int, bool], tuple[tuple[int, ...], tuple[int, ...]]]
+        self._rivals = {}
 
     # --- at a point
 
@@ -278,13 +281,15 @@ class Agreement:
         self, place: int, *, is_strict: bool
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Return the rules that must be weaker for one to decide, and not stronger."""
-        rules = self.base.rules
-        group = self.groups[rules[place].model]
-        others = [k for k in group if rules[k].then != rules[place].then]
-        if is_strict:
-            return tuple(others), ()
-        before = tuple(k for k in others if k < place)
-        return before, tuple(k for k in others if k > place)
+        key = place, is_strict
+        if key not in self._rivals:
+            rules = self.base.rules
+            group = self.groups[rules[place].model]
+            others = [k for k in group if rules[k].then != rules[place].then]
+            before = tuple(k for k in others if is_strict or k < place)
+            after = tuple(k for k in others if not is_strict and k > place)
+            self._rivals[key] = before, after
+        return self._rivals[key]
 
     def _quick(self, pair: Pair, budget: Budget, *, is_strict: bool) -> Answer:
         """Decide a pair by questions of one level, if they suffice."""
@@ -354,12 +359,11 @@ class Agreement:
 
         They are of the model, but not of the class, of the `other` rule.
         """
-        return [
-            k
-            for k in self.groups[self.base.rules[other].model]
-            if self.base.rules[k].then != self.base.rules[other].then
-            and self.is_below(place, k)
-        ]
+        rules = self.base.rules
+        if place not in self._above:
+            group = self.groups[1 - rules[place].model]
+            self._above[place] = [k for k in group if self.is_below(place, k)]
+        return [k for k in self._above[place] if rules[k].then != rules[other].then]
 
     def is_below(self, place: int, other: int) -> bool:
         """Return whether a rule is nowhere stronger than another one, by its parts."""
