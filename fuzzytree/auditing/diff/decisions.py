@@ -17,9 +17,8 @@ import msgspec
 import numpy as np
 
 from fuzzytree.auditing.decide import Budget, OutOfStepsError
-from fuzzytree.auditing.diff.agreement import OF, Agreement, Prediction
+from fuzzytree.auditing.diff.agreement import Agreement, Prediction
 from fuzzytree.auditing.diff.difference_records import DecisionEvidence
-from fuzzytree.auditing.diff.matching import have_same_classes
 from fuzzytree.auditing.diff.regions import difference_region
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import (
@@ -62,7 +61,6 @@ _MOST_LISTED = 24  # pairs of classes with a witness each
 _POINTS = 0.5  # of the budget is for single points, the rest for proofs
 _PORTION = 1024  # rows between two looks at the budget
 _MOST_REGIONS = 4  # of which the box is looked for
-_SAME_CLASSES = "each class has the same rules: answers differ only where classes tie"
 
 Progress = Callable[[str, float], None]
 
@@ -155,8 +153,6 @@ def decisions(
     if not differences.witnesses:
         report("proving that decisions are equal", 0.3)
         state = differences.both.state(budget)
-        if isinstance(state, Bracket) and have_same_classes(pair.old, pair.new):
-            state = Bracket(OF, 0.0, 0.0, _SAME_CLASSES)
         if isinstance(state, Witness):
             differences.add_point(point_of(state.point))
         else:

@@ -9,7 +9,7 @@ propositions in common.
 from __future__ import annotations
 
 import itertools
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
@@ -124,30 +124,6 @@ class RuleKeys:
     def words(self, rule: Rule) -> Hashable:
         """Return what rules have in common that read the same."""
         return frozenset(map(words_of, rule.when)), self.then(rule)
-
-
-def have_same_classes(old: RuleBase, new: RuleBase) -> bool:
-    """Return whether each class has the same rules in both, in any order and number.
-
-    The two can then differ only where two classes are equally strong.
-    """
-    one, other = old.semantics, new.semantics
-    if (one.conjunction, one.uncovered) != (other.conjunction, other.uncovered):
-        return False
-    curves = Curves()
-    keys: list[set[Hashable]] = []
-    for rules in (old, new):
-        said = RuleKeys(rules, curves)
-        known: set[Hashable] = set()
-        for rule in rules.rules:
-            counts = Counter(map(said.proposition, rule.when))
-            if (
-                one.conjunction == "minimum"
-            ):  # a proposition that stands twice counts once
-                counts = Counter({*counts})
-            known.add((frozenset(counts.items()), rule.then))
-        keys.append(known)
-    return keys[0] == keys[1]
 
 
 def words_of(proposition: Proposition) -> NamedKey:

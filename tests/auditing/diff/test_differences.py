@@ -179,7 +179,7 @@ def test_rules_in_another_order_differ_only_where_classes_tie() -> None:
     assert isinstance(state, Bracket)
     assert (state.low, state.high) == (0.0, 0.0)
     assert state.why == (
-        "each class has the same rules: answers differ only where classes tie"
+        "answers differ only where classes tie, and no such row is known"
     )
     assert found.answers[0].sentence == (
         "no decision was seen to differ, and where both margins are larger than 0 "
