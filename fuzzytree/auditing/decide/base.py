@@ -20,7 +20,7 @@ from fuzzytree.auditing.decide.axes import (
 from fuzzytree.auditing.decide.lines import Lines
 from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, Literal, rules_of
 from fuzzytree.auditing.engine.domain import Domain, combined
-from fuzzytree.model import BoolArray, Document, FloatArray, Variable
+from fuzzytree.model import BoolArray, Document, FloatArray, FuzzySystem, Variable
 
 SAMPLES = 4096
 """Points that are drawn, which find most of what there is to find."""
@@ -39,6 +39,7 @@ class Base:
         domain: The domain.
         silent: Rules that never fire, as their text says.
         left_out: Rules that have no exact method.
+        uncovered: The class where no rule fires.
 
     Example:
         >>> from fuzzytree.auditing.engine.domain import DomainSide
@@ -62,6 +63,7 @@ class Base:
         self.seed, self.most_pieces = seed, most_pieces
         self.silent: tuple[tuple[str, int, str], ...] = ()
         self.left_out: tuple[LeftOut, ...] = ()
+        self.uncovered: str | None = None
         self.count = len(self.rules)
         self.every = (1 << self.count) - 1
         self.inputs: dict[str, Axis] = {}
@@ -92,6 +94,8 @@ class Base:
         variables = {variable.name: variable for variable in model.variables}
         base = cls(every.rules, variables, domain, seed=seed)
         base.silent, base.left_out = every.silent, every.left_out
+        if not isinstance(model, FuzzySystem):
+            base.uncovered = model.semantics.uncovered
         return base
 
     @classmethod

@@ -24,7 +24,7 @@ from fuzzytree.auditing.decide.answers import (
     Proved,
     Question,
 )
-from fuzzytree.auditing.decide.axes import Axis
+from fuzzytree.auditing.decide.axes import Axis, value_at
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.lines import Lines
 from fuzzytree.auditing.decide.rules import Literal
@@ -45,23 +45,27 @@ class Stretches:
     def __init__(self, axis: Axis) -> None:
         self.axis = axis
         self.x = [*axis.values] or [x for x in axis.knots if axis.low <= x <= axis.high]
+        self.last_number = len(self.x) - 1
+        if not axis.values:  # values beside the range stand behind it
+            self.x += axis.extra
         self.last = len(self.x) - 1
         self.sides = {
             literal: (self._floats(both.lower), self._floats(both.upper))
             for literal, both in axis.bounds.items()
         }
         self._tables: dict[tuple[int, bool], FloatArray] = {}
+        self._are_doubles: dict[Literal, bool] = {}
 
     def _floats(self, lines: Lines) -> tuple[FloatArray, FloatArray, FloatArray]:
         start = lines.x.index(self.x[0])
-        at = np.array([float(v) for v in lines.at[start : start + self.last + 1]])
+        end = start + self.last_number
+        beside = [float(value_at(lines, x)) for x in self.x[self.last_number + 1 :]]
+        at = np.array([*map(float, lines.at[start : end + 1]), *beside])
         if self.axis.values:
             return at, at[:-1], at[1:]
-        after, before = (
-            np.array([float(v) for v in side[start : start + self.last]])
-            for side in (lines.after, lines.before)
-        )
-        return at, after, before
+        after = [*map(float, lines.after[start:end]), *at[self.last_number : -1]]
+        before = [*map(float, lines.before[start:end]), *beside]
+        return at, np.array(after), np.array(before)
 
     def range(
         self, literal: Literal, low: FloatArray, high: FloatArray
@@ -70,10 +74,29 @@ class Stretches:
         lower, upper = self.sides[literal]
         least = self._extreme(lower, low, high, is_most=False)
         most = self._extreme(upper, low, high, is_most=True)
+        off = self._rounding(literal, low, high)
         return (
-            np.where(least >= 1.0, 1.0, np.clip(least - _ROUND, 0.0, None)),
-            np.where(most <= 0.0, 0.0, most + _ROUND),
+            np.where(least >= 1.0, 1.0, np.clip(least - off, 0.0, None)),
+            np.where(most <= 0.0, 0.0, most + off),
         )
+
+    def _rounding(
+        self, literal: Literal, low: FloatArray, high: FloatArray
+    ) -> FloatArray:
+        """Return how far degrees may be off: not at all where they are doubles."""
+        if literal not in self._are_doubles:
+            both = self.axis.bounds[literal]
+            values = [v for lines in both for side in lines[1:] for v in side]
+            self._are_doubles[literal] = all(Fraction(float(v)) == v for v in values)
+        off = np.full_like(low, _ROUND)
+        if not self._are_doubles[literal] or not self.last:
+            return off
+        flat = np.ones(len(low), dtype=bool)
+        for _, after, before in self.sides[literal]:
+            for end in (low, high):
+                piece = np.minimum(end.astype(int), self.last - 1)
+                flat &= (end == np.floor(end)) | (after[piece] == before[piece])
+        return np.where(flat, 0.0, off)
 
     def _extreme(
         self,

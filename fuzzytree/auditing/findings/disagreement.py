@@ -4,26 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import (
-    Arrangement,
-    arrange,
-    restricted,
-    strengths_at,
-)
-from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.decisions import (
-    BoxBounds,
-    columns,
-    decision_at,
-    other_decision,
-)
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.nearest import NARROW, Nearest, nearest
-from fuzzytree.auditing.engine.regions import Region, boxes, leaf_at, regions
+from fuzzytree.auditing.decide.answers import Budget, Point
+from fuzzytree.auditing.decide.answers import Proved as NoPoint
+from fuzzytree.auditing.decide.base import Base
+from fuzzytree.auditing.decide.contest import Contest, decided
+from fuzzytree.auditing.decide.costs import Costs, Nearest
+from fuzzytree.auditing.decide.polytopes import Leaves
+from fuzzytree.auditing.decide.search import Search
+from fuzzytree.auditing.engine.domain import Domain, contains
+from fuzzytree.auditing.engine.regions import point_in, regions
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -31,15 +23,15 @@ from fuzzytree.auditing.engine.states import (
     Proved,
     State,
     Witness,
-    point_of,
+    coordinates,
 )
-from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
-from fuzzytree.auditing.findings.robustness import CrispDecider
 from fuzzytree.auditing.findings.rows import (
     DomainRows,
+    budget_of,
     distance_measure,
     narrowed_state,
     points_of,
@@ -47,92 +39,106 @@ from fuzzytree.auditing.findings.rows import (
 )
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import FuzzyTree, RuleBase
-from fuzzytree.numerics import decide, outwards
+from fuzzytree.numerics import decide
 
 MOST_ROWS = 2000
 """Rows around which the nearest disagreement is sought."""
 
-_LEAF_PART = 0.25  # of the time that is left, for one leaf
-_PART = 0.9  # of the time, to seek; the rest is for the answers
-_HINTS = 16  # rows from which a point where both differ is sought by doubles
+_PART = 0.9  # of the steps, to seek; the rest is for other codes
+_LEAF_PART = 0.25  # of the steps that are left, for one leaf
+
+_Row = tuple[int, dict[str, Fraction]]
 
 
 class TreeAndRules:
-    """A tree and its raw rules, compared with each other."""
+    """A tree and its raw rules, compared with each other.
 
-    def __init__(
-        self,
-        tree: FuzzyTree,
-        raw: RuleBase,
-        domain: Domain,
-        leaf_regions: Sequence[Region],
-    ) -> None:
-        self.tree, self.domain, self.leaf_regions = tree, domain, leaf_regions
-        self.arrangement = arrange(raw, domain)
-        self.crisp = CrispDecider(tree, domain)
-        self.around = BoxBounds(raw, domain)
+    Attributes:
+        leaves: The regions of the leaves.
+        base: The raw rules.
+    """
 
-    def claims(self, point: Mapping[str, Fraction]) -> tuple[Claim, Claim]:
-        """Return what both decide at a point."""
-        label = self.tree.leaves[leaf_at(self.tree, point) - 1].label
-        other = decision_at(self.arrangement, point)
-        return (
-            Claim("decides", of="tree", label=label),
-            Claim("decides", of="raw rules", label=other),
-        )
+    def __init__(self, tree: FuzzyTree, raw: RuleBase, domain: Domain) -> None:
+        self.tree, self.raw, self.domain = tree, raw, domain
+        self.leaves, self.base = Leaves(tree, domain), Base.of(raw, domain)
+        self.costs = Costs(domain, tree.inputs)
+        labels = dict.fromkeys(self.leaves.labels)
+        self.contests = {label: Contest(self.base, label) for label in labels}
 
     def differ(self, point: Mapping[str, Fraction]) -> bool:
         """Return whether both decide differently at a point of the domain."""
-        one, other = self.claims(point)
-        return one.label != other.label and is_within(self.arrangement, point)
-
-    def disagree(self, box: Domain, clock: Clock) -> State:
-        """Return whether both decide differently somewhere in a box."""
-        left_open: State | None = None
-        for region in self.leaf_regions:
-            inside = [*boxes(region, self.tree, box)]
-            state = other_in_boxes(self.arrangement, inside, region.label, clock)
-            if isinstance(state, Witness):
-                return state
-            if not isinstance(state, Proved):
-                left_open = left_open or state
-        return left_open or Proved("all leaves compared")
-
-    def clear_of_cuts(self, point: Mapping[str, Fraction], label: str | None) -> float:
-        """Return a radius within which the tree decides alike, by doubles."""
-        return self.crisp.bound(point, label)
-
-
-def other_in_boxes(
-    arrangement: Arrangement, inside: Sequence[Domain], label: str, clock: Clock
-) -> State:
-    """Return whether raw rules decide for another class somewhere in some boxes."""
-    left_open: State | None = None
-    for box in inside:
-        state = other_decision(
-            restricted(arrangement, box), label, clock, of="raw rules"
+        label, _ = self.leaves.decided(point)
+        return label != decided(self.base, point)[0] and contains(
+            self.domain, self.tree.variables, point
         )
-        if isinstance(state, Witness):
-            tree_too = Claim("decides", of="tree", label=label)
-            return Witness(state.point, (tree_too, *state.claims), state.region)
-        if not isinstance(state, Proved):
-            left_open = left_open or state
-    return left_open or Proved(f"{len(inside)} boxes compared")
 
+    def claims(self, point: Mapping[str, Fraction]) -> tuple[Claim, Claim]:
+        """Return what both decide at a point."""
+        return (
+            Claim("decides", of="tree", label=self.leaves.decided(point)[0]),
+            Claim("decides", of="raw rules", label=decided(self.base, point)[0]),
+        )
 
-class _Row(NamedTuple):
-    """A row at which both decide alike: its number, values, class, distance to cuts."""
+    def drawn(self) -> dict[int, dict[str, Fraction]]:
+        """Return for leaves a point that was drawn, at which both differ."""
+        values = np.array([[*map(float, one)] for one in self.base.samples])
+        leaves = decide(self.tree, values).rule
+        result: dict[int, dict[str, Fraction]] = {}
+        for place in np.flatnonzero(self._differ(values)).tolist():
+            leaf, point = int(leaves[place]), self.base.sample(place)
+            if leaf not in result and self.differ(point):
+                result[leaf] = point
+        return result
 
-    number: int
-    point: dict[str, Fraction]
-    label: str | None
-    cut: float
+    def _differ(self, values: np.ndarray) -> np.ndarray:
+        """Return at which points in doubles both differ, shape (points,)."""
+        own = [leaf.label for leaf in self.tree.leaves]
+        other = [self.raw.semantics.uncovered, *(rule.then for rule in self.raw.rules)]
+        raw = decide(self.raw, values, with_strengths=False).rule.tolist()
+        tree = decide(self.tree, values).rule.tolist()
+        pairs = zip(tree, raw, strict=True)
+        return np.array([own[leaf - 1] != other[rule] for leaf, rule in pairs])
+
+    def search(
+        self,
+        part: int,
+        point: Mapping[str, Fraction],
+        budget: Budget,
+        most: Fraction | None = None,
+    ) -> Search:
+        """Return the search for where both differ in a part of a leaf."""
+        contest = self.contests[self.leaves.labels[part]]
+        box = self.leaves.boxes[part]
+        return Search(
+            contest, point, self.costs, budget, part=box, most=most, accepts=self.differ
+        )
+
+    def nearest(
+        self, row: Mapping[str, Fraction], best: Nearest | None, budget: Budget
+    ) -> Nearest:
+        """Return the nearest point to a row where both differ, nearer than a best."""
+        most = None if best is None else best.high
+        low, result, why = most, Nearest(Fraction(1), is_none=True), ""
+        bounds = self.leaves.parts.bounds(row, self.costs)
+        for part in sorted(range(len(bounds)), key=bounds.__getitem__):
+            if most is not None and bounds[part] >= most:
+                break
+            near = self.search(part, row, budget, most).run()
+            why = why or near.why
+            if near.high is not None or most is not None or near.why:
+                low = near.low if low is None else min(low, near.low)
+            if near.high is not None:
+                most, result = near.high, near
+        if low is None:
+            return result
+        low = max(low, Fraction(0))
+        return Nearest(low, result.high, result.point, why)
 
 
 def nearest_difference(
     both: TreeAndRules,
     points: DomainRows,
-    clock: Clock,
+    subject: Subject,
     *,
     known: Sequence[Mapping[str, Fraction]] = (),
     is_alike: bool = False,
@@ -141,21 +147,9 @@ def nearest_difference(
 
     Rows at which they differ already are counted, and then left aside.
     """
-    inputs = both.tree.inputs
-    values = columns([point for _, point in points.at], inputs)
-    tree = decide(both.tree, values)
-    raw = decide(both.arrangement.rules, values, with_strengths=False)
-    alike: list[_Row] = []
-    differ: list[Mapping[str, Fraction]] = []
-    for place in np.argsort(raw.margin, kind="stable").tolist():
-        number, point = points.at[place]
-        label = both.tree.leaves[int(tree.rule[place]) - 1].label
-        if label == answer_of(both.arrangement.rules, int(raw.rule[place])):
-            cut = both.clear_of_cuts(point, label)
-            alike.append(_Row(number, point, label, cut))
-        else:
-            differ.append(point)
-    search = _Search(both, alike[:MOST_ROWS], clock)
+    alike = [(n, point) for n, point in points.at if not both.differ(point)]
+    differ = [point for _, point in points.at if both.differ(point)]
+    search = _Rows(both, alike[:MOST_ROWS], subject)
     if is_alike:
         search.count = len(search.rows)
     else:
@@ -165,105 +159,64 @@ def nearest_difference(
         yield rows_left_out("FT203", len(search.rows) - search.count)
 
 
-def answer_of(rules: RuleBase, number: int) -> str | None:
-    """Return what rules answer where a rule wins, by its number; 0 is none."""
-    return rules.rules[number - 1].then if number else rules.semantics.uncovered
-
-
-class _Search:
+class _Rows:
     """The nearest disagreement to any of some rows, as far as it is known.
 
     Attributes:
         count: How many rows were settled: around them none is nearer than `low`.
         low: Nearer than this there is none; None if there is none at all.
         best: The nearest one that is known, and `row` the number of its row.
-        claims: What both decide there.
         why: Why more is not known.
     """
 
-    def __init__(self, both: TreeAndRules, rows: Sequence[_Row], clock: Clock) -> None:
-        self.both, self.rows, self.clock = both, rows, clock
-        self.end = clock.share(_PART)
+    def __init__(
+        self, both: TreeAndRules, rows: Sequence[_Row], subject: Subject
+    ) -> None:
+        self.both, self.rows, self.subject = both, rows, subject
+        self.budget = budget_of(subject).share(_PART)
         self.count = self.row = 0
         self.low: Fraction | None = None
         self.best: Nearest | None = None
-        self.claims: tuple[Claim, ...] = ()
         self.why = ""
 
     def run(self, points: Sequence[Mapping[str, Fraction]]) -> None:
         """Look around one row after the other, no farther than the best one is.
 
-        `points`: where both may differ; the rows that are nearest to one come first.
+        `points`: where both differ; the rows that are nearest to one come first.
         """
-        try:
-            if self.rows:
-                self._run(points)
-        except OutOfTimeError:
-            self.why = "the budget was spent"
-
-    def _run(self, points: Sequence[Mapping[str, Fraction]]) -> None:
-        inputs, around = self.both.tree.inputs, self.both.around
-        values = columns([row.point for row in self.rows], inputs)
-        some = self.rows[:_HINTS]
-        near, away = around.approached(values[:, :_HINTS], [row.label for row in some])
-        moved = near[:, away < np.inf].T.tolist()
-        points = [
-            *points,
-            *(dict(zip(inputs, map(Fraction, one), strict=True)) for one in moved),
-        ]
-        hints = around.pairs(values, columns(points, inputs))
-        for place in np.argsort([far for _, far in hints], kind="stable").tolist():
-            row, (hint, far) = self.rows[place], hints[place]
-            share = self.count / len(self.rows)
-            self.clock.report(f"nearest disagreement to row {row.number}", share)
-            if not self._is_clear(row):
-                result = nearest(
-                    self.both.domain,
-                    row.point,
-                    lambda box: self.both.disagree(box, self.end),
-                    self.both.differ,
-                    self.end,
-                    within=None if self.best is None else self.best.high,
-                    near=[points[hint]] if far < np.inf else (),
-                )
-                if result.is_none:  # and so for all of them: it covered the domain
-                    self.count, self.low = len(self.rows), None
-                    return
-                self._keep(row, result)
-            self.count += 1
-            if self.end.is_over and self.count < len(self.rows):
+        costs = self.both.costs
+        order: list[tuple[Fraction, int]] = []
+        for place, (number, row) in enumerate(self.rows):
+            pairs = [(costs.distance(row, point), point) for point in points]
+            away, point = min(
+                pairs, key=lambda pair: pair[0], default=(Fraction(1), None)
+            )
+            order.append((away, place))
+            high = None if self.best is None else self.best.high
+            if point is not None and (high is None or away < high):
+                self.best, self.row = Nearest(away, away, dict(point)), number
+        for _, place in sorted(order):
+            if self.budget.is_spent:
                 self.why = self.why or "the budget was spent"
                 return
-
-    def _keep(self, row: _Row, result: Nearest) -> None:
-        """Keep what is known around a row, and its point if it is the nearest."""
-        self._lower(result.low)
-        high, best = result.high, None if self.best is None else self.best.high
-        if result.why and not result.is_narrow:
-            self.why = self.why or f"around row {row.number}: {result.why}"
-        if result.point is not None and high is not None and (not best or high < best):
-            self.claims = self.both.claims(result.point)
-            self.best, self.row = result, row.number
-
-    def _lower(self, low: Fraction) -> None:
-        self.low = low if self.low is None else min(self.low, low)
-
-    def _is_clear(self, row: _Row) -> bool:
-        """Return whether bounds show that both agree around a row, up to the best."""
-        if self.best is None or self.best.high is None:
-            return False
-        radius = max(self.best.low, self.best.high * (1 - NARROW))
-        around = self.both.around
-        centre = columns([row.point], around.inputs)
-        ball = around.ball(centre, outwards(radius)[1])
-        if row.cut < radius or not around.is_clear(*ball, [row.label]).all():
-            return False
-        self._lower(radius)
-        return True
+            number, row = self.rows[place]
+            share = self.count / len(self.rows)
+            text = f"nearest disagreement to row {number}"
+            self.subject.clock.report(text, share)
+            result = self.both.nearest(row, self.best, self.budget)
+            if result.is_none:  # and so for all of them: it covered the domain
+                self.count, self.low = len(self.rows), None
+                return
+            self.low = result.low if self.low is None else min(self.low, result.low)
+            if result.why and not result.is_narrow:
+                self.why = self.why or f"around row {number}: {result.why}"
+            if result.point is not None:
+                self.best, self.row = result, number
+            self.count += 1
 
 
 def _nearest_answer(
-    points: DomainRows, search: _Search, differ: int, alike: int
+    points: DomainRows, search: _Rows, differ: int, alike: int
 ) -> AuditAnswer:
     measures = [Measure("rows that differ already", differ)]
     measures.append(Measure("rows evaluated", search.count))
@@ -292,15 +245,16 @@ def _nearest_answer(
     measures.append(distance_measure("certified distance", low))
     measures.append(distance_measure("distance of the witness", best.high))
     measures.append(Measure("row", search.row))
+    claims = search.both.claims(best.point)
     state = narrowed_state(
-        "the distance of the nearest disagreement", low, best, search.claims, search.why
+        "the distance of the nearest disagreement", low, best, claims, search.why
     )
     return audit_answer(
         "FT203.nearest", "rows", state, measures=tuple(measures), facts=facts
     )
 
 
-def _no_nearest(search: _Search, low: Fraction) -> State:
+def _no_nearest(search: _Rows, low: Fraction) -> State:
     if search.why:
         name = "the distance of the nearest disagreement"
         return Bracket(name, float(low), 1.0, search.why)
@@ -315,64 +269,80 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     tree, raw = subject.tree, subject.raw
     if tree is None or raw is None:
         return
-    leaf_regions = regions(tree)
-    declined = too_many_boxes(leaf_regions)
+    declined = too_many_boxes(regions(tree))
     if declined is not None:
         yield audit_answer("FT203.leaves-declined", "leaves", declined)
         return
-    known: list[AuditAnswer] = []
-    for answer in leaf_differences(subject, raw, tree, leaf_regions):
-        known.append(answer)
-        yield answer
-    if subject.rows is not None:
-        both = TreeAndRules(tree, raw, subject.domain, leaf_regions)
-        points = points_of(subject, subject.rows)
-        points_known = [
-            point_of(one.state.point) for one in known if isinstance(one.state, Witness)
-        ]
-        # Only the answer about all leaves is left where they are alike everywhere.
-        is_alike = len(known) == 1
-        yield from nearest_difference(
-            both, points, subject.clock, known=points_known, is_alike=is_alike
-        )
-
-
-def leaf_differences(
-    subject: Subject, raw: RuleBase, tree: FuzzyTree, leaf_regions: Sequence[Region]
-) -> Iterator[AuditAnswer]:
-    """Yield the leaves in whose regions the raw rules decide differently."""
-    arrangement = arrange(raw, subject.domain)
-    alike = count = 0
-    for region in leaf_regions:
+    both = TreeAndRules(tree, raw, subject.domain)
+    known: list[dict[str, Fraction]] = []
+    is_alike = True
+    drawn = both.drawn()
+    alike = 0
+    for leaf in range(1, len(tree.leaves) + 1):
         subject.clock.report(
-            f"leaf {region.leaf} against the raw rules", region.leaf / len(leaf_regions)
+            f"leaf {leaf} against the raw rules", leaf / len(tree.leaves)
         )
-        inside = [*boxes(region, tree, subject.domain)]
-        subject.clock.check()
-        part = subject.clock.share(_LEAF_PART)
-        state = other_in_boxes(arrangement, inside, region.label, part)
-        count += len(inside)
+        budget = budget_of(subject).share(_LEAF_PART)
+        point, state = _leaf_difference(both, leaf, drawn.get(leaf), budget)
+        if point is not None:
+            known.append(point)
         if isinstance(state, Proved):
             alike += 1
         else:
-            yield _difference(arrangement, region, state)
+            is_alike = False
+            yield _difference(both, leaf, point, state)
+    count = len(both.leaves.boxes)
     how = f"all other decisions were sought in {count} boxes of the leaves"
-    facts = {"alike": alike, "leaves": len(leaf_regions)}
+    facts = {"alike": alike, "leaves": len(tree.leaves)}
     yield audit_answer("FT203.leaves", "leaves", Proved(how), facts=facts)
+    if subject.rows is not None:
+        points = points_of(subject, subject.rows)
+        yield from nearest_difference(
+            both, points, subject, known=known, is_alike=is_alike
+        )
 
 
-def _difference(arrangement: Arrangement, region: Region, state: State) -> AuditAnswer:
-    name = f"leaf {region.leaf}"
-    rules: tuple[int, ...] = (region.leaf,)
-    if not isinstance(state, Witness):
-        return audit_answer("FT203.open", name, state, rules=rules)
-    strengths = strengths_at(arrangement, point_of(state.point))
-    best = max(strengths)
-    winner = strengths.index(best) + 1
-    if best and winner != region.leaf:
-        rules = (*rules, winner)
-    facts = {"then": region.label, "other": state.claims[-1].label}
-    span = state.region
-    return audit_answer(
-        "FT203.differs", name, state, rules=rules, region=span, facts=facts
-    )
+def _leaf_difference(
+    both: TreeAndRules, leaf: int, point: dict[str, Fraction] | None, budget: Budget
+) -> tuple[dict[str, Fraction] | None, State]:
+    """Return a point of a leaf at which both differ, and the state of the answer."""
+    why = ""
+    for part, number in enumerate(both.leaves.numbers):
+        if number != leaf or point is not None:
+            continue
+        start = point_in(both.leaves.boxes[part], both.tree)
+        if start is None:
+            continue
+        answer = both.search(part, start, budget).any()
+        if isinstance(answer, Point):
+            point = dict(answer.values)
+        elif not isinstance(answer, NoPoint):
+            why = why or answer.why
+    if point is not None:
+        label = decided(both.base, point)[0]
+        near = simplified(
+            point,
+            both.domain,
+            lambda other: (
+                both.differ(other)
+                and both.leaves.decided(other)[1] == leaf
+                and decided(both.base, other)[0] == label
+            ),
+        )
+        return near, Witness(coordinates(near), both.claims(near))
+    if why:
+        return None, Declined("FTD03", why)
+    return None, Proved("")
+
+
+def _difference(
+    both: TreeAndRules, leaf: int, point: dict[str, Fraction] | None, state: State
+) -> AuditAnswer:
+    name, rules = f"leaf {leaf}", [leaf]
+    if point is None:
+        return audit_answer("FT203.open", name, state, rules=(leaf,))
+    other, place = decided(both.base, point)
+    if place is not None and place + 1 != leaf:
+        rules.append(place + 1)
+    facts = {"then": both.tree.leaves[leaf - 1].label, "other": other}
+    return audit_answer("FT203.differs", name, state, rules=tuple(rules), facts=facts)

@@ -7,26 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-import numpy as np
-
-from fuzzytree.auditing.engine.arrangement import arrange, restricted, strengths_at
-from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.decisions import (
-    BoxBounds,
-    columns,
-    decision_at,
-    other_decision,
-)
-from fuzzytree.auditing.engine.domain import Domain, contains, variable_value
-from fuzzytree.auditing.engine.nearest import (
-    NARROW,
-    Nearest,
-    Polytope,
-    Polytopes,
-    nearest,
-    polytope_of,
-)
-from fuzzytree.auditing.engine.regions import boxes, leaf_at, regions
+from fuzzytree.auditing.decide.base import Base
+from fuzzytree.auditing.decide.contest import decided
+from fuzzytree.auditing.decide.costs import Nearest
+from fuzzytree.auditing.decide.nearest import nearest
+from fuzzytree.auditing.decide.polytopes import Leaves
+from fuzzytree.auditing.engine.domain import contains, variable_value
+from fuzzytree.auditing.engine.regions import regions
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -37,139 +24,42 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.auditing.engine.witnesses import is_within, simplified
+from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.rows import (
     DomainRows,
+    budget_of,
     distance_measure,
     narrowed_state,
     points_of,
     rows_left_out,
 )
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model import FuzzyTree
 from fuzzytree.numerics import outwards
 
-Point = dict[str, Fraction]
 
-_HALVINGS = 16  # of a radius, to find one within which bounds decide the class
-
-
-def decider_of(subject: Subject) -> Decider:
-    """Return what decides: the regions of a tree, or the strengths of rules."""
-    if subject.tree is not None:
-        return CrispDecider(subject.tree, subject.domain)
-    return RuleDecider(subject)
-
-
-class CrispDecider:
-    """A tree, by the regions of its leaves."""
-
-    of: Representation = "tree"
-
-    def __init__(self, tree: FuzzyTree, domain: Domain) -> None:
-        self.tree, self.domain = tree, domain
-        self.labels: list[str] = []
-        parts: list[Polytope] = []
-        variables = {variable.name: variable for variable in tree.variables}
-        for region in regions(tree):
-            for box in boxes(region, tree, domain):
-                self.labels.append(region.label)
-                parts.append(polytope_of(box, tree.inputs, variables))
-        self.polytopes = Polytopes(domain, tree.inputs, parts)
-
-    def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
-        """Return the class of the leaf that a point reaches, and the leaf."""
-        leaf = leaf_at(self.tree, point)
-        return self.tree.leaves[leaf - 1].label, f"leaf {leaf}"
-
-    def leaves_out(self, label: str | None) -> bool:
-        """Return False: regions are exact, and have no strengths."""
-        del label
-        return False
-
-    def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
-        """Return how far the nearest region of another class is."""
-        label, _ = self.decided(point)
-        return self.polytopes.nearest(point, self._others(label), clock)
-
-    def bound(self, point: Mapping[str, Fraction], label: str | None) -> float:
-        """Return a radius within which no region of another class is, by doubles."""
-        bounds = self.polytopes.bounds(point)
-        return min((bounds[number] for number in self._others(label)), default=np.inf)
-
-    def _others(self, label: str | None) -> list[int]:
-        return [number for number, own in enumerate(self.labels) if own != label]
-
-
-class RuleDecider:
-    """Rules of which the strongest decides."""
-
-    of: Representation = "rules"
+class RowDecider:
+    """What decides rows: the regions of a tree's leaves, or the strongest rule."""
 
     def __init__(self, subject: Subject) -> None:
         self.subject, self.domain = subject, subject.domain
-        self.arrangement = arrange(subject.rules, subject.domain)
-        self.around = BoxBounds(subject.rules, subject.domain)
+        self.base: Base | Leaves
+        self.of: Representation = "rules"
+        if subject.tree is not None:
+            self.base, self.of = Leaves(subject.tree, subject.domain), "tree"
+        else:
+            self.base = Base.of(subject.rules, subject.domain)
 
     def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
-        """Return the class of the first of the strongest rules, and the rule."""
-        strengths = strengths_at(self.arrangement, point)
-        best = max(strengths)
-        if not best:
-            return self.subject.rules.semantics.uncovered, "no rule"
-        number = strengths.index(best) + 1
-        label = self.subject.rules.rules[number - 1].then
-        return label, self.subject.rule_name(number)
+        """Return the class at a point, and the leaf or the rule that decides."""
+        if isinstance(self.base, Leaves):
+            label, leaf = self.base.decided(point)
+            return label, f"leaf {leaf}"
+        own, place = decided(self.base, point)
+        return own, "no rule" if place is None else self.subject.rule_name(place + 1)
 
-    def leaves_out(self, label: str | None) -> bool:
-        """Return whether a rule of another class stands before one of a class's.
-
-        It wins where both are equally strong, and only sets with an interior are
-        searched.
-        """
-        order = [rule.then == label for rule in self.subject.rules.rules]
-        return any(order) and not all(order[: len(order) - order[::-1].index(True)])
-
-    def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
-        """Return how far the nearest point is where a rule of another class wins."""
-        label = decision_at(self.arrangement, point)
-        inputs = self.subject.rules.inputs
-        ahead, far = self.around.approached(columns([point], inputs), [label])
-        hint = dict(zip(inputs, map(Fraction, ahead[:, 0].tolist()), strict=True))
-        away = float(far[0])
-
-        def is_one(other: Mapping[str, Fraction]) -> bool:
-            return is_within(self.arrangement, other) and (
-                decision_at(self.arrangement, other) != label
-            )
-
-        return nearest(
-            self.subject.domain,
-            point,
-            lambda box: other_decision(restricted(self.arrangement, box), label, clock),
-            is_one,
-            clock,
-            clear=self._clear(point, label, away),
-            near=[hint] if away < np.inf else (),
-        )
-
-    def _clear(
-        self, point: Mapping[str, Fraction], label: str | None, away: float
-    ) -> Fraction | None:
-        """Return a radius within which bounds in doubles decide the class."""
-        centre = columns([point], self.subject.rules.inputs)
-        top = min(away, 1.0) * (1.0 - float(NARROW))
-        radii = [top * 0.5**number for number in range(_HALVINGS)]
-        balls = [self.around.ball(centre, radius) for radius in radii]
-        low, high = (np.concatenate(ends, axis=1) for ends in zip(*balls, strict=True))
-        clear = self.around.is_clear(low, high, [label] * len(radii))
-        return Fraction(radii[int(clear.argmax())]) if clear.any() else None
-
-
-Decider = CrispDecider | RuleDecider
 
 MOST_ROWS = 50
 """Rows whose radius is sought by strengths."""
@@ -180,7 +70,7 @@ MOST_ROWS_OF_TREE = 1000
 SHOWN_ROWS = 5
 """Rows of the smallest radius that have an answer of their own."""
 
-_PART = 0.9  # of the time, to seek; the rest is for the answers
+_PART = 0.9  # of the steps, to seek; the rest is for other codes
 _MOST_NAMED = 4  # inputs in a sentence
 
 
@@ -194,8 +84,8 @@ def radius(subject: Subject, row: Mapping[str, float]) -> AuditAnswer:
         ValueError: If the row lies outside the domain.
     """
     point = _point(subject, row)
-    decider = decider_of(subject)
-    result = decider.nearest_other(point, subject.clock)
+    decider = RowDecider(subject)
+    result = nearest(decider.base, point, budget=budget_of(subject))
     return _answer(decider, "the row", point, result)
 
 
@@ -210,8 +100,9 @@ def row_answers(subject: Subject, row: Mapping[str, float]) -> Iterator[AuditAns
         yield audit_answer("FT204.not-sought", "row", declined)
         return
     point = _point(subject, row)
-    label, by = decider_of(subject).decided(point)
-    claim = Claim("decides", of=decider_of(subject).of, label=label)
+    decider = RowDecider(subject)
+    label, by = decider.decided(point)
+    claim = Claim("decides", of=decider.of, label=label)
     yield audit_answer(
         "FT204.decided",
         "row",
@@ -246,12 +137,10 @@ def _point(subject: Subject, row: Mapping[str, float]) -> dict[str, Fraction]:
 
 
 def _answer(
-    decider: Decider, name: str, point: Mapping[str, Fraction], result: Nearest
+    decider: RowDecider, name: str, point: Mapping[str, Fraction], result: Nearest
 ) -> AuditAnswer:
     own, _ = decider.decided(point)
     facts: dict[str, FactValue] = {"name": name, "then": own}
-    if decider.leaves_out(own):  # rules of other classes go first in a tie
-        facts["aside"] = 1
     title = name.removeprefix("the ")
     what = f"the distance from {name} to another decision"
     state: State
@@ -296,22 +185,21 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
         yield audit_answer("FT204.not-sought", "rows", declined or needed)
         return
     points = points_of(subject, subject.rows)
-    decider = decider_of(subject)
-    clock = subject.clock.share(_PART)
+    decider = RowDecider(subject)
+    budget = budget_of(subject).share(_PART)
     radii: list[_RowRadius] = []
     most = MOST_ROWS if subject.tree is None else MOST_ROWS_OF_TREE
     chosen = points.at[:most]
     for number, point in chosen:
-        if clock.is_over:
+        if budget.is_spent:
             break
         subject.clock.report(f"radius of row {number}", len(radii) / len(chosen))
-        result = decider.nearest_other(point, clock)
+        result = nearest(decider.base, point, budget=budget)
         is_worth_keeping = result.is_narrow or (not radii and result.high is not None)
-        if clock.is_over and not is_worth_keeping:
+        if budget.is_spent and not is_worth_keeping:
             break
         answer = _answer(decider, f"row {number}", point, result)
-        is_aside = decider.leaves_out(decider.decided(point)[0])
-        radii.append(_RowRadius(number, result.low, answer, is_aside))
+        radii.append(_RowRadius(number, result.low, answer))
     radii.sort(key=lambda one: (one.low, one.number))
     yield _in_all(points, radii)
     yield from (one.answer for one in radii[:SHOWN_ROWS])
@@ -323,7 +211,6 @@ class _RowRadius(NamedTuple):
     number: int
     low: Fraction
     answer: AuditAnswer
-    is_aside: bool
 
 
 def _in_all(points: DomainRows, radii: Sequence[_RowRadius]) -> AuditAnswer:
@@ -339,8 +226,6 @@ def _in_all(points: DomainRows, radii: Sequence[_RowRadius]) -> AuditAnswer:
     first = radii[0]
     least = first.low
     facts = points.facts
-    if any(one.is_aside for one in radii):
-        facts["aside"] = 1
     if len(radii) < len(points.at):
         facts["different"] = len(points.at)
     median = statistics.median_low([one.low for one in radii])

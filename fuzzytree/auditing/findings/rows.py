@@ -9,9 +9,11 @@ from fractions import Fraction
 import msgspec
 import numpy as np
 
+from fuzzytree.auditing.decide.answers import STEPS, Budget
+from fuzzytree.auditing.decide.costs import Costs, Nearest
+from fuzzytree.auditing.decide.polytopes import Polytopes, polytope_of
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains
 from fuzzytree.auditing.engine.domain import span as ends_on
-from fuzzytree.auditing.engine.nearest import Nearest, Polytopes, polytope_of
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -29,6 +31,12 @@ from fuzzytree.model import Variable
 from fuzzytree.numerics import decide, outwards
 
 _MOST_DIGITS = 80  # of an exact number beside a double
+
+
+def budget_of(subject: Subject) -> Budget:
+    """Return the budget of an audit."""
+    budget = getattr(subject, "budget", None)
+    return budget if isinstance(budget, Budget) else Budget(STEPS)
 
 
 class DomainRows(msgspec.Struct, frozen=True, eq=False):
@@ -110,8 +118,9 @@ def rank_by_distance(
     """
     combined = {one.name: one for one in variables if one.parts}
     boxes = [_box(gap, domain, combined) for gap in gaps]
+    costs = Costs(domain, inputs)
     parts = Polytopes(
-        domain, inputs, [polytope_of(box or domain, inputs, combined) for box in boxes]
+        inputs, [polytope_of(box or domain, inputs, combined.values()) for box in boxes]
     )
     fixed = {one.variable: one.low for one in domain.sides if one.low == one.high}
     fixed_point = {name: Fraction(fixed[name]) for name in inputs if name in fixed}
@@ -120,7 +129,7 @@ def rank_by_distance(
         for number, values in enumerate(rows.values.T.tolist(), 1)
         if all(map(math.isfinite, values))
     }
-    bounds = {number: parts.bounds(point) for number, point in points.items()}
+    bounds = {number: parts.bounds(point, costs) for number, point in points.items()}
     known: list[tuple[Fraction, AuditAnswer]] = []
     unknown: list[AuditAnswer] = []
     for place, (gap, box) in enumerate(zip(gaps, boxes, strict=True)):
@@ -128,7 +137,7 @@ def rank_by_distance(
         for bound, number in sorted((bounds[one][place], one) for one in points):
             if box is None or (best is not None and bound > best[0]):
                 break
-            low = parts.nearest(points[number], [place]).low
+            low = parts.nearest(points[number], [place], costs).low
             best = (low, number) if best is None or low < best[0] else best
         if best is None:
             unknown.append(gap)
@@ -160,7 +169,8 @@ def _box(
         whole = sides[name]
         low_end = whole.low if one.low is None else max(whole.low, one.low)
         high_end = whole.high if one.high is None else min(whole.high, one.high)
-        sides[name] = DomainSide(name, low_end, high_end)
+        inside = tuple(x for x in whole.points if low_end <= x <= high_end)
+        sides[name] = DomainSide(name, low_end, high_end, values=inside)
     return Domain(tuple(sides.values())) if spans else None
 
 
