@@ -25,7 +25,6 @@ from typing import Any, NamedTuple
 
 from fuzzytree.rechecking.case import Case
 from fuzzytree.rechecking.checks import (
-    LIMITS,
     UNCHECKED,
     check_answer,
     check_files,
@@ -51,6 +50,7 @@ from fuzzytree.rechecking.records import (
     read_json,
 )
 from fuzzytree.rechecking.sentences import (
+    LIMITS,
     MESSAGES,
     names_in,
     open_interval,

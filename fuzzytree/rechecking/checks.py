@@ -37,33 +37,9 @@ from fuzzytree.rechecking.records import (
     Witness,
     fraction,
 )
-from fuzzytree.rechecking.sentences import MESSAGES, sentence_of
+from fuzzytree.rechecking.sentences import LIMITS, MESSAGES, sentence_of
 from fuzzytree.rechecking.witnesses import SHOWS, check_spans, check_witness
 from fuzzytree.rechecking.words import stretch_word
-
-LIMITS = (
-    "that the rules are right: an audit finds what a rule base says, not whether it is "
-    "true of the world",
-    "anything outside the domain: every answer holds on the stated ranges and nowhere "
-    "else",
-    "that all of the domain can happen: inputs are combined in every way, also in "
-    "those that no row will ever have",
-    "more about a sampled share than its interval says, and that only with the stated "
-    "confidence",
-    "what a bracket leaves open: the number lies between the two ends, and nothing "
-    "more is known",
-    "anything about what was declined or not run; both are listed",
-    "that strengths which only touch are reported: ties and gaps without an interior "
-    "are left out",
-    "what rounding changes: answers are about real numbers at the doubles of the "
-    "model, and a runtime may differ where strengths nearly tie",
-    "that other files, runtimes or devices answer alike: only what was compared is "
-    "compared",
-    "that the given rows are right, or stand for those to come",
-    "who made this audit: the digest shows an edit, and is no signature",
-)
-"""What every audit says that it does not establish, word for word."""
-
 
 NOT_ASKED = ("FT801", "FT802", "FT901")
 """Codes that no audit must answer or list."""
@@ -318,7 +294,7 @@ def _words(case: Case, answer: Answer) -> None:
     if is_share and isinstance(answer.state, Sampled):
         is_hit = answer.state.hits > 0 and not answer.subject.endswith("points")
         require(answer.is_finding is is_hit, "it is a finding, or none")
-    wanted_subject = SUBJECTS.get(answer.message, answer.subject)
+    wanted_subject = MESSAGES[answer.message].subject or answer.subject
     if answer.code == "FT107" and "proposition" in answer.facts:
         wanted_subject = "{rule}, {proposition!r}".format(**answer.facts)
     if answer.message in ("FT301.weak", "FT301.reaches"):
@@ -333,22 +309,6 @@ def _words(case: Case, answer: Answer) -> None:
         require(
             not is_known or known[name] == fact, f"{name}: it is {known.get(name)!r}"
         )
-
-
-SUBJECTS = {
-    **dict.fromkeys(("FT104.others", "FT105.others", "FT106.others"), "pairs of rules"),
-    **dict.fromkeys(
-        ("FT201.never", "FT201.unlisted", "FT202.others"), "pairs of rules"
-    ),
-    **dict.fromkeys(("FT401.reached", "FT402.sound"), "terms"),
-    **dict.fromkeys(("FT403.others", "FT403.unlisted"), "pairs of terms"),
-    **dict.fromkeys(("FT101.leaves", "FT203.leaves"), "leaves"),
-    "FT404.used": "terms and variables",
-    "FT301.fires": "cover",
-    "FT501.size": "the rule base",
-    "FT501.size-of-view": "the rule base",
-}
-"""The subjects of messages that have one alone."""
 
 
 def _known_facts(case: Case, answer: Answer) -> dict[str, Any]:

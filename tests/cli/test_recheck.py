@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.rechecking.checks import LIMITS
+from fuzzytree.rechecking.sentences import LIMITS
 from tests.auditing.diff.test_system_numbers import tipper
 
 CODES = ("--select", "FT1,FT301,FT404")

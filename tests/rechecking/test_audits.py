@@ -26,7 +26,8 @@ from fuzzytree.model import FuzzySystem
 from fuzzytree.model.rulebase import Conjunction, RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.rechecking import CannotRunError, recheck
-from fuzzytree.rechecking.checks import LIMITS, digest_of
+from fuzzytree.rechecking.checks import digest_of
+from fuzzytree.rechecking.sentences import LIMITS
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 from tests.auditing.engine.bases import Kind, random_base

@@ -12,7 +12,7 @@ from fuzzytree.auditing.engine import states
 from fuzzytree.auditing.findings.records import LIMITS, Audit, AuditAnswer
 from fuzzytree.exporters import yaml
 from fuzzytree.numerics import decide
-from fuzzytree.rechecking import CannotRunError, checks, records
+from fuzzytree.rechecking import CannotRunError, records, sentences
 from fuzzytree.rechecking.case import strengths
 from fuzzytree.rechecking.curves import bounds, is_straight, knots
 from fuzzytree.rechecking.models import Model
@@ -54,7 +54,7 @@ def test_its_rules_of_a_tree_are_ours() -> None:
 
 
 def test_the_panel_is_ours() -> None:
-    assert checks.LIMITS == LIMITS
+    assert sentences.LIMITS == LIMITS
 
 
 def test_the_records_of_an_audit_are_ours() -> None:
