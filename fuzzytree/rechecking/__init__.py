@@ -21,19 +21,18 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple
 
 from fuzzytree.rechecking.case import Case
 from fuzzytree.rechecking.checks import (
     UNCHECKED,
+    Questions,
     check_answer,
-    check_files,
     check_gaps,
     check_head,
+    check_source,
+    decide,
     digest_of,
-    judge,
 )
-from fuzzytree.rechecking.claims import Statement
 from fuzzytree.rechecking.models import Model
 from fuzzytree.rechecking.outcomes import (
     CannotRunError,
@@ -41,14 +40,7 @@ from fuzzytree.rechecking.outcomes import (
     Report,
     UndecidedError,
 )
-from fuzzytree.rechecking.records import (
-    Answer,
-    Audit,
-    Declined,
-    Proved,
-    built,
-    read_json,
-)
+from fuzzytree.rechecking.records import Audit, Declined, Proved, built, read_json
 from fuzzytree.rechecking.sentences import (
     LIMITS,
     MESSAGES,
@@ -57,7 +49,7 @@ from fuzzytree.rechecking.sentences import (
     sentence_of,
 )
 from fuzzytree.rechecking.smt import Script
-from fuzzytree.rechecking.solvers import ask, script_text
+from fuzzytree.rechecking.solvers import script_text
 from fuzzytree.rechecking.two_models import recheck_difference
 from fuzzytree.rechecking.words import (
     DATE_UNIT,
@@ -76,11 +68,9 @@ __all__ = [
     "MESSAGES",
     "MISSING",
     "CannotRunError",
-    "Confirmation",
     "Report",
     "claims_text",
     "confirm",
-    "confirm_difference",
     "digest_of",
     "is_plain",
     "listed",
@@ -95,9 +85,6 @@ __all__ = [
     "stretch_word",
     "value_word",
 ]
-
-Questions = list[tuple[int, Answer, list[Statement]]]
-"""The number of each answer that a solver must decide, and its claims."""
 
 
 def recheck(
@@ -114,17 +101,15 @@ def recheck(
     Raises:
         CannotRunError: If one of them cannot be read, or the solver fails.
     """
-    facts, result, case = _read(audit, model, names)
-    report = Report(UNCHECKED)
-    report.codes = [one.code for one in case.answers]
+    result, case = _read(audit, model, names)
+    report = Report(UNCHECKED, result.answers)
     questions: Questions = []
+    digest = digest_of(read_json(audit, names[0]))
+    report.expect(result.digest == digest, f"the digest is {digest}")
+    check_source(report, case.file, model, names[1])
     try:
-        check_files(case, report, facts, model, names[1])
         check_head(result, case, report)
-        for number, answer in enumerate(case.answers, 1):
-            questions.append(
-                (number, answer, check_answer(case, report, answer, number))
-            )
+        questions = _questions(case, report)
         gaps = check_gaps(result, case)
         if gaps is not None:
             questions.append((case.answers.index(gaps[0]) + 1, *gaps))
@@ -132,44 +117,32 @@ def recheck(
         report.wrong.append(str(error))
     except (LookupError, TypeError, ValueError):
         report.wrong.append("an answer names what there is not")
-    _decide(case, report, questions, solver)
+    decide(case.script, report, questions, solver)
     return report
 
 
-def _decide(case: Case, report: Report, questions: Questions, solver: str) -> None:
-    """Ask a solver for all claims, and note which answers it confirms."""
-    questions = [one for one in questions if one[2]]
-    every = [claim for *_, claims in questions for claim in claims]
-    if not every and not solver:
-        return
-    results = ask(case.script.text(), every, solver)
-    answers = iter(results.answers)
-    for number, answer, claims in questions:
-        pairs = [(claim, next(answers)) for claim in claims]
-        is_proof = isinstance(answer.state, Proved)
-        if not results.solver:
-            report.unconfirmed += is_proof
-            continue
-        with report.answer(number, answer):
-            judge(pairs, is_exact=case.script.is_exact)
-            state = "answers PROVED" if is_proof else "bounds of other answers"
-            report.counts[f"{state}, confirmed by {results.solver}"] += 1
-            report.confirmed[number - 1] = results.solver
+def _read(audit: bytes, model: bytes, names: tuple[str, str]) -> tuple[Audit, Case]:
+    result: Audit = built(Audit, read_json(audit, names[0]), names[0])
+    left_out = [o.subject for o in result.answers if isinstance(o.state, Declined)]
+    whole = Model(model, names[1], left_out)
+    if whole.form == "system" and result.policy.decision == "strongest":
+        text = "a system that stands for rules is not checked again; audit these"
+        raise CannotRunError(f"{names[0]}: {text}")
+    if any(side.is_open for side in result.domain.sides):
+        raise CannotRunError(f"{names[0]}: a domain with an open side is not checked")
+    return result, Case(result, whole)
 
 
-class Confirmation(NamedTuple):
-    """What is confirmed of the PROVED answers of an audit that is not yet done.
-
-    Attributes:
-        confirmed: By its position what confirms an answer: a solver, or `recheck`.
-        refuted: By the position of each answer that is wrong, why.
-    """
-
-    confirmed: dict[int, str]
-    refuted: dict[int, str]
+def _questions(case: Case, report: Report, kinds: type = object) -> Questions:
+    """Return the claims of answers whose states are of a kind."""
+    return [
+        (number, answer, check_answer(case, report, answer, number))
+        for number, answer in enumerate(case.answers, 1)
+        if isinstance(answer.state, kinds)
+    ]
 
 
-def confirm(audit: bytes, model: bytes) -> Confirmation:
+def confirm(audit: bytes, model: bytes) -> Report:
     """Ask the package z3, if it is there, for each PROVED answer of an audit.
 
     Args:
@@ -179,9 +152,10 @@ def confirm(audit: bytes, model: bytes) -> Confirmation:
     Raises:
         CannotRunError: If the model cannot be read, or the solver fails.
     """
-    case, questions, report = _claims(audit, model)
-    _decide(case, report, questions, "")
-    return _confirmation(report)
+    _, case = _read(audit, model, ("the audit", "model.yaml"))
+    report = Report("", case.answers)
+    decide(case.script, report, _questions(case, report, Proved), "")
+    return report
 
 
 def claims_text(audit: bytes, model: bytes) -> str:
@@ -190,23 +164,13 @@ def claims_text(audit: bytes, model: bytes) -> str:
     Raises:
         CannotRunError: If the model cannot be read.
     """
-    case, questions, _ = _claims(audit, model)
+    _, case = _read(audit, model, ("the audit", "model.yaml"))
     every = [
         claim._replace(text=f"{answer.code}: {claim.text}")
-        for _, answer, claims in questions
+        for _, answer, claims in _questions(case, Report("", case.answers), Proved)
         for claim in claims
     ]
     return script_text(case.script.text(), every)
-
-
-def confirm_difference(diff: bytes, old: bytes, new: bytes) -> Confirmation:
-    """Ask the package z3, if it is there, for each PROVED answer of a comparison.
-
-    Raises:
-        CannotRunError: If a model cannot be read, or the solver fails.
-    """
-    names = "the comparison", "old.yaml", "new.yaml"
-    return _confirmation(recheck_difference(diff, old, new, names))
 
 
 def model_text(model: bytes) -> str:
@@ -219,59 +183,16 @@ def model_text(model: bytes) -> str:
     if whole.reasons:
         every = (f"{name}: {why}" for name, why in whole.reasons.items())
         raise CannotRunError("; ".join(every))
-    script = Script()
+    script, variables = Script(), whole.variables.values()
     ends = {
         v.name: (Fraction(v.low), Fraction(v.high))
-        for v in whole.variables.values()
+        for v in variables
         if v.low is not None and v.high is not None
     }
-    values = {
-        v.name: [
-            *map(Fraction, range(len(v.categories))),
-            *([] if v.missing is None else [v.missing]),
-        ]
-        for v in whole.variables.values()
-    }
-    script.add(whole, ends, values=values)
+    stand_ins = {v.name: [] if v.missing is None else [v.missing] for v in variables}
+    codes = {v.name: [*map(Fraction, range(len(v.categories)))] for v in variables}
+    script.add(whole, ends, values={n: codes[n] + stand_ins[n] for n in codes})
     return script.text()
-
-
-def _claims(audit: bytes, model: bytes) -> tuple[Case, Questions, Report]:
-    """Return the claims of all PROVED answers."""
-    _, _, case = _read(audit, model, ("the audit", "model.yaml"))
-    report, questions = Report(), Questions()
-    for number, answer in enumerate(case.answers, 1):
-        if isinstance(answer.state, Proved):
-            questions.append(
-                (number, answer, check_answer(case, report, answer, number))
-            )
-    return case, questions, report
-
-
-def _confirmation(report: Report) -> Confirmation:
-    refuted: dict[int, str] = {}
-    for text in report.wrong:
-        where, is_answer, why = text.partition("): ")
-        if is_answer:
-            refuted.setdefault(int(where.split(" ")[1]) - 1, why)
-    return Confirmation(report.confirmed, refuted)
-
-
-def _read(
-    audit: bytes, model: bytes, names: tuple[str, str]
-) -> tuple[dict[str, Any], Audit, Case]:
-    facts = read_json(audit, names[0])
-    result: Audit = built(Audit, facts, names[0])
-    left_out = [
-        one.subject for one in result.answers if isinstance(one.state, Declined)
-    ]
-    whole = Model(model, names[1], left_out)
-    if whole.form == "system" and result.policy.decision == "strongest":
-        text = "a system that stands for rules is not checked again; audit these"
-        raise CannotRunError(f"{names[0]}: {text}")
-    if any(side.is_open for side in result.domain.sides):
-        raise CannotRunError(f"{names[0]}: a domain with an open side is not checked")
-    return facts, result, Case(result, whole)
 
 
 def recheck_files(*names: str, solver: str = "") -> Report:

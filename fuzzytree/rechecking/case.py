@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import cached_property
 
-from fuzzytree.rechecking.curves import ONE, ZERO, Between, bounds, is_straight, knots
-from fuzzytree.rechecking.models import Model, Point, Proposition, Rule, Rules, Variable
+from fuzzytree.rechecking.curves import ONE, ZERO, Between, bounds
+from fuzzytree.rechecking.models import Model, Point, Proposition, Rules, Variable
 from fuzzytree.rechecking.outcomes import (
     DoesNotHoldError,
     Report,
@@ -22,18 +22,14 @@ from fuzzytree.rechecking.records import (
     Claim,
     Coordinate,
     Difference,
-    Span,
     Witness,
     fraction,
 )
-from fuzzytree.rechecking.smt import Script
+from fuzzytree.rechecking.smt import Script, all_of
 from fuzzytree.rechecking.words import value_word
 
 MOST_POINTS = 16
-_SHOWN = ("FT101", "FT103", "FT201", "FT205")
-"""The codes whose witnesses are points at which all rules are evaluated."""
-CLOSE = Fraction(1, 2**70)
-"""How far beside a point curves that are no lines are evaluated, where many are."""
+Choice = Callable[[Iterable[Fraction]], Fraction]
 
 
 class Case:
@@ -41,7 +37,6 @@ class Case:
 
     Attributes:
         sides: The sides of the domain by name.
-        is_free: Whether no variable is a combination of others.
         numbers: The numbers of the rules, from 1.
     """
 
@@ -51,18 +46,22 @@ class Case:
         self.file = facts.file if isinstance(facts, Audit) else None
         sides = {side.variable: side for side in facts.domain.sides}
         self.sides = {n: side for n, side in sides.items() if n in model.variables}
-        self.is_free = not any(v.parts for v in model.variables.values())
         self.numbers = range(1, len(self.rules.rules) + 1)
         self._strengths: dict[tuple[object, ...], list[Between]] = {}
 
     @cached_property
     def script(self) -> Script:
         """The model as text for a solver."""
-        ends = {n: (Fraction(s.low), Fraction(s.high)) for n, s in self.sides.items()}
-        values = {name: side.points for name, side in self.sides.items()}
         script = Script()
-        script.add(self.model, ends, values=values)
+        self.add_to(script)
         return script
+
+    def add_to(self, script: Script, of: str = "", *, is_bounded: bool = True) -> None:
+        """Add the model to a text, within the domain or for all numbers."""
+        sides = self.sides if is_bounded else {}
+        ends = {n: (Fraction(s.low), Fraction(s.high)) for n, s in sides.items()}
+        values = {name: side.points for name, side in sides.items()}
+        script.add(self.model, ends, of, values)
 
     def reaches(self, number: int, sign: str, level: Fraction) -> str:
         """Return that a rule's strength is `>` or `>=` a level, for a solver."""
@@ -72,6 +71,21 @@ class Case:
     def symbol(self, number: int) -> str:
         """Return the strength of a rule, in the text for a solver."""
         return self.script.symbol(self.name(number))
+
+    def over(self, number: int, rivals: Iterable[int]) -> str:
+        """Return that a rule fires and is above rivals, for a solver."""
+        own = self.symbol(number)
+        above = (f"(> {own} {self.symbol(n)})" for n in rivals)
+        return all_of([f"(> {own} 0.0)", *above])
+
+    def wins(self, number: int, symbols: Sequence[str], *, is_strict: bool) -> str:
+        """Return that a rule decides: as the first of the strongest, or strictly."""
+        own = symbols[number - 1]
+        formulas = [f"(> {own} 0.0)"]
+        for n in self.rivals(number):
+            sign = ">" if is_strict or n < number else ">="
+            formulas.append(f"({sign} {own} {symbols[n - 1]})")
+        return all_of(formulas)
 
     def ends(self, variable: Variable) -> tuple[Fraction, Fraction]:
         """Return the values of a variable in the domain; of a sum, at most."""
@@ -85,11 +99,13 @@ class Case:
             if side is None:
                 return low, high
             return max(low, Fraction(side.low)), min(high, Fraction(side.high))
-        require(side is not None, f"the domain has no side {variable.name!r}")
-        assert side is not None
+        if side is None:
+            raise DoesNotHoldError(f"the domain has no side {variable.name!r}")
         stand_in = side.low if side.missing is None else side.missing
         numbers = side.low, side.high, stand_in
         return Fraction(min(numbers)), Fraction(max(numbers))
+
+    # --- rules
 
     def then(self, number: int) -> str:
         """Return the class of a rule."""
@@ -103,7 +119,7 @@ class Case:
         """Return the rules of other classes."""
         return [n for n in self.numbers if self.then(n) != self.then(number)]
 
-    def own(self, label: str | None) -> list[int]:
+    def own(self, label: object) -> list[int]:
         """Return the rules of a class."""
         return [n for n in self.numbers if self.then(n) == label]
 
@@ -111,77 +127,50 @@ class Case:
         """Return the pairs of rules, of one class or of two; not ways of one rule."""
         of = self.model.numbers
         return [
-            (one, other)
-            for one, other in itertools.combinations(self.numbers, 2)
-            if of[one - 1] != of[other - 1]
-            and alike in (None, self.then(one) == self.then(other))
+            (a, b)
+            for a, b in itertools.combinations(self.numbers, 2)
+            if of[a - 1] != of[b - 1] and alike in (None, self.then(a) == self.then(b))
         ]
+
+    def conflicts(self) -> set[tuple[int, int]]:
+        """Return the pairs of rules that say different things of one output."""
+        pairs = self.pairs(alike=False)
+        return {pair for pair in pairs if self.model.may_conflict(*pair)}
 
     def coded(self, start: str) -> list[Answer]:
         """Return the answers whose message begins so."""
-        return [one for one in self.answers if one.message.startswith(start)]
+        return [o for o in self.answers if o.message.startswith(start)]
 
-    # --- points that are known
+    def live(self) -> set[int]:
+        """Return the rules that no answer says never to fire."""
+        dead = [*self.coded("FT101.never-fires"), *self.coded("FT107.silent")]
+        numbers = {self.model.numbers[o.rules[0] - 1] for o in dead if o.rules}
+        return {n for n in self.numbers if self.model.numbers[n - 1] not in numbers}
 
     @cached_property
-    def known(self) -> list[tuple[Point, list[Between]]]:
+    def samples(self) -> list[tuple[Point, list[Between]]]:
         """Witnesses and other points of the domain, with the strengths of all rules."""
         points = [
-            {c.input: fraction(c.exact) for c in one.state.point}
-            for one in self.answers
-            if isinstance(one.state, Witness) and one.code in _SHOWN
+            {c.input: fraction(c.exact) for c in answer.state.point}
+            for answer in self.answers
+            if isinstance(answer.state, Witness)
         ]
-        points = [p for p in points if p.keys() == {*self.inputs}]
         chance = random.Random(0)
         for _ in range(MOST_POINTS):
             point = {}
             for name in self.inputs:
                 low, high = self.ends(self.model.variables[name])
-                share = Fraction(chance.randrange(1025), 1024)
-                point[name] = low + (high - low) * share
+                point[name] = low + (high - low) * Fraction(
+                    chance.randrange(1025), 1024
+                )
             points.append(point)
-        result: list[tuple[Point, list[Between]]] = [
-            (p, strengths(self.rules, p)) for p in points if self.is_within(p)
-        ]
-        for n in self.numbers:
-            if not any(every[n - 1][0] for _, every in result):
-                best = self.best(n)
-                if self.is_within(best):
-                    result.append((best, strengths(self.rules, best)))
-        return result
+        is_whole = {*self.inputs}
+        points = [p for p in points if p.keys() == is_whole and self.is_within(p)]
+        return [(point, strengths(self.rules, point)) for point in points]
 
-    @cached_property
-    def _values(self) -> dict[str, list[Fraction]]:
-        """The values of each input at which its curves change, and between these."""
-        result: dict[str, list[Fraction]] = {}
-        for name in self.inputs:
-            low, high = self.ends(self.model.variables[name])
-            curves = self.rules.variables[name].curves.values()
-            inner = {x for one in curves for x in knots(one) if low < x < high}
-            ends = sorted({low, high, *inner})
-            ends += [(a + b) / 2 for a, b in itertools.pairwise(ends)]
-            result[name] = ends
-        return result
-
-    def best(self, number: int) -> dict[str, Fraction]:
-        """Return a point at which a rule is strong, axis by axis."""
-        when, point = self.rules.rules[number - 1].when, {}
-        for name, values in self._values.items():
-            own = [one for one in when if one.variable == name]
-            part = self.rules._replace(rules=(Rule(tuple(own), ""),))
-            only = part._replace(variables={name: self.rules.variables[name]})
-            least = [strengths(only, {name: x})[0][0] for x in values] if own else [ONE]
-            point[name] = values[least.index(max(least))]
-        return point
-
-    @cached_property
-    def above(self) -> dict[int, set[int]]:
-        """For each rule those known to be above it somewhere; for 0 those that fire."""
-        result: dict[int, set[int]] = {n: set() for n in (0, *self.numbers)}
-        for _, one in self.known:
-            for n, (_, most) in enumerate([(ZERO, ZERO), *one]):
-                result[n] |= {m for m in self.numbers if one[m - 1][0] > most}
-        return result
+    def is_above(self, number: int, other: int) -> bool:
+        """Return whether a rule is above another one at some sample."""
+        return any(s[number - 1][0] > s[other - 1][1] for _, s in self.samples)
 
     # --- points
 
@@ -191,7 +180,7 @@ class Case:
         return [v.name for v in self.model.variables.values() if not v.parts]
 
     def is_within(self, point: Point) -> bool:
-        """Return whether a point is in the domain."""
+        """Return whether a row of the domain can be this point."""
         values = {n: self.model.variables[n].at(point) for n in self.sides}
         return all(side.has(values[n]) for n, side in self.sides.items())
 
@@ -201,10 +190,10 @@ class Case:
         is_whole = point.keys() == {*self.inputs}
         require(is_whole, "the point does not have a value of every input")
         require(self.is_within(point), "the point lies outside the domain")
-        for one in coordinates:
-            column, value = self.model.variables[one.input], point[one.input]
-            word = value_word(column, self.sides.get(one.input), value)
-            require(one.word == word, f"{one.input!r} is {word!r}, not {one.word!r}")
+        for c in coordinates:
+            column, value = self.model.variables[c.input], point[c.input]
+            word = value_word(column, self.sides.get(c.input), value)
+            require(c.word == word, f"{c.input!r} is {word!r}, not {c.word!r}")
         return point
 
     def check_point(
@@ -219,97 +208,77 @@ class Case:
             report.counts["claims evaluated again"] += 1
         return point
 
-    def corners(self, region: Sequence[Span], point: Point) -> Iterator[Point]:
-        """Yield corners and the middle of a region, other inputs at three values.
-
-        A corner lies just above the lower ends, for these may belong to a neighbour.
-        """
-        spans = {span.variable: span for span in region}
-        if not spans or not self.is_free:
-            return
-        ends: dict[str, tuple[Fraction, Fraction, Fraction]] = {}
-        for name, side in self.sides.items():
-            span = spans.get(name, Span(name, None, None, ""))
-            low = Fraction(side.low if span.low is None else span.low)
-            high = Fraction(side.high if span.high is None else span.high)
-            middle = (low + high) / 2 if name in spans else point[name]
-            ends[name] = low + (high - low) / 2**30, high, middle
-        ways = itertools.product((0, 1), repeat=len(spans))
-        chosen = [*itertools.islice(ways, 16), (2,) * len(spans)]
-        for way, other in itertools.product(chosen, range(3)):
-            places = dict.fromkeys(ends, other) | dict(zip(spans, way, strict=True))
-            result = {name: ends[name][place] for name, place in places.items()}
-            if self.is_within(result):
-                yield result
-
-    def holds(self, claim: Claim, point: Point, off: Fraction = ZERO) -> bool:
+    def holds(self, claim: Claim, point: Point) -> bool:
         """Return whether a claim holds at a point, evaluated in fractions.
 
         Raises:
             DoesNotHoldError: If it is no claim about this model.
             UndecidedError: If two numbers are too near to distinguish.
         """
-        used = {n for n, one in zip(claim._fields, claim, strict=True) if one}
-        alien = used - {"kind", "of", *FIELDS[claim.kind].split(" ")}
+        fields = {n for n, value in zip(claim._fields, claim, strict=True) if value}
+        alien = fields - {"kind", "of", *FIELDS[claim.kind].split(" ")}
         require(not alien, f"a claim of kind {claim.kind} has no {', '.join(alien)}")
         rules = self.model.raw if claim.of == "raw rules" else self.rules
-        is_known = claim.of in ("rules", "raw rules") or self.model.form == claim.of
-        if rules is None or not is_known:
+        is_there = claim.of in ("rules", "raw rules") or self.model.form == claim.of
+        if rules is None or not is_there:
             raise DoesNotHoldError(f"there are no {claim.of} to claim something of")
         if claim.kind == "decides":
             if claim.of == "tree":
                 return self.model.leaves[self.model.leaf_at(point) - 1] == claim.label
             return class_at(rules, point) == claim.label
         require(claim.of != "tree", "a tree has no strengths")
-        level = None if claim.level is None else fraction(claim.level)
+        level = ZERO if claim.level is None else fraction(claim.level)
+        is_so = (claim.level is None) is ("level" not in FIELDS[claim.kind])
+        require(is_so, "a claim without its level")
         if claim.kind == "degree":
-            known = rules.variables.get(claim.variable or "")
-            if known is None or claim.term not in known.curves or level is None:
+            variable = rules.variables.get(claim.variable or "")
+            if variable is None or claim.term not in variable.curves:
                 raise DoesNotHoldError("a claim of an unknown term")
-            x = known.at(point)
-            low, high = bounds(known.curves[claim.term], x, x)
+            x = variable.at(point)
+            low, high = bounds(variable.curves[claim.term], x, x)
             return low <= level <= high
         key = claim.of, *point.values()
         if key not in self._strengths:
-            self._strengths[key] = strengths(rules, point, off)
+            self._strengths[key] = strengths(rules, point)
         every = self._strengths[key]
-        is_known = all(1 <= n <= len(every) for n in (*claim.rules, *claim.rivals))
-        require(is_known, "a claim of an unknown rule")
-        ours = [every[n - 1] for n in claim.rules or range(1, len(every) + 1)]
-        rivals = [every[n - 1] for n in claim.rivals]
+        is_there = all(1 <= n <= len(every) for n in (*claim.rules, *claim.rivals))
+        require(is_there, "a claim of an unknown rule")
         require(bool(claim.rules) or claim.kind == "covered", "a claim of no rule")
-        least, most = (
-            tuple(choose(one[end] for one in ours) for end in (0, 1))
-            for choose in (min, max)
-        )
-        top = tuple(max((one[end] for one in rivals), default=ZERO) for end in (0, 1))
-        if claim.kind == "covered":
-            return less((ZERO, ZERO), most)
-        if claim.kind == "beats":
-            return less(top, least)  # alone: it fires
-        if claim.kind == "ties":
-            is_one = least == most and least[0] == least[1]
-            return is_one and (not rivals or less(top, least))
-        if level is None:
-            raise DoesNotHoldError("a claim without its level")
-        if claim.kind == "strength":
-            return ours[0][0] <= level <= ours[0][1]
-        if claim.kind == "below":
-            return most[1] == level == 0 or less(most, (level, level))
-        return least[0] >= level or not less(least, (level, level))
+        ours = [every[n - 1] for n in claim.rules] or every
+        rivals = [(ZERO, ZERO), *(every[n - 1] for n in claim.rivals)]
+        least, most, top = _ends(min, ours), _ends(max, ours), _ends(max, rivals)
+        match claim.kind:
+            case "covered":
+                return less((ZERO, ZERO), most)
+            case "beats":
+                return less(top, least)  # alone: it fires
+            case "ties":
+                is_tie = least == most and least[0] == least[1]
+                return is_tie and (not claim.rivals or less(top, least))
+            case "strength":
+                return ours[0][0] <= level <= ours[0][1]
+            case "below":
+                return most[1] == level == 0 or less(most, (level, level))
+            case "reaches":
+                return least[0] >= level or not less(least, (level, level))
+
+
+def _ends(choose: Choice, of: list[Between]) -> Between:
+    """Return the least, or the most, of the lower and of the upper ends."""
+    return choose(low for low, _ in of), choose(high for _, high in of)
 
 
 def values_of(coordinates: Sequence[Coordinate]) -> dict[str, Fraction]:
     """Return a point whose digits are one number each."""
     point: dict[str, Fraction] = {}
-    for one in coordinates:
-        value = fraction(one.exact)
+    for c in coordinates:
+        value = fraction(c.exact)
         near = float(value)
         hexed = near.hex() if Fraction(near) == value else None
-        text = f"{one.input!r}: the decimal or hexadecimal digits are not {one.exact}"
-        require((repr(near), hexed) == (one.decimal, one.hex), text)
-        require(one.input not in point, f"{one.input!r} stands twice in the point")
-        point[one.input] = value
+        text = f"{c.input!r}: the decimal or hexadecimal digits are not {c.exact}"
+        require((repr(near), hexed) == (c.decimal, c.hex), text)
+        require(c.input not in point, f"{c.input!r} stands twice in the point")
+        point[c.input] = value
     return point
 
 
@@ -326,37 +295,31 @@ FIELDS = {
 """What each kind of claim is about."""
 
 
-def less(one: tuple[Fraction, ...], other: tuple[Fraction, ...]) -> bool:
+def less(lower: Between, upper: Between) -> bool:
     """Return whether a number is below another one, each between two ends."""
-    if one[1] < other[0]:
+    if lower[1] < upper[0]:
         return True
-    if one[0] < other[1]:
+    if lower[0] < upper[1]:
         raise UndecidedError("two strengths are too near to distinguish")
     return False
 
 
-def strengths(rules: Rules, point: Point, off: Fraction = ZERO) -> list[Between]:
-    """Return between which numbers the strength of each rule at a point lies.
-
-    With `off`, those of curves that are no lines also so far beside it.
-    """
+def strengths(rules: Rules, point: Point) -> list[Between]:
+    """Return between which numbers the strength of each rule at a point lies."""
     values = {name: variable.at(point) for name, variable in rules.variables.items()}
-    known: dict[Proposition, Between] = {}
+    degrees: dict[Proposition, Between] = {}
     result: list[Between] = []
     for rule in rules.rules:
         low = high = ONE
         for proposition in rule.when:
-            if proposition not in known:
-                curves = rules.variables[proposition.variable].curves
+            if proposition not in degrees:
                 x = values[proposition.variable]
-                every = [
-                    bounds(curve, x, x if is_straight(curve) else x + off)
-                    for curve in (curves[term] for term in proposition.terms)
-                ]
-                a, b = (max(one[end] for one in every) for end in (0, 1))
+                curves = rules.variables[proposition.variable].curves
+                every = [bounds(curves[term], x, x) for term in proposition.terms]
+                a, b = _ends(max, every)
                 a, b = (1 - b, 1 - a) if proposition.negated else (a, b)
-                known[proposition] = proposition.weight * a, proposition.weight * b
-            a, b = known[proposition]
+                degrees[proposition] = proposition.weight * a, proposition.weight * b
+            a, b = degrees[proposition]
             if rules.is_product:
                 low, high = low * a, high * b
             else:
@@ -374,9 +337,8 @@ def class_at(rules: Rules, point: Point) -> str | None:
     if best[1] == 0:
         return rules.uncovered
     first = result.index(best)
-    for place, one in enumerate(result):
-        is_exact = one == best and one[0] == one[1]
-        is_other = rules.rules[place].then != rules.rules[first].then
-        if is_other and not is_exact:
-            less(one, best)
+    for rule, strength in zip(rules.rules, result, strict=True):
+        is_exact = strength == best and best[0] == best[1]
+        if rule.then != rules.rules[first].then and not is_exact:
+            less(strength, best)
     return rules.rules[first].then

@@ -14,10 +14,10 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.rechecking.case import Case
-from fuzzytree.rechecking.curves import ZERO, Curve, bounds, is_straight, knots
-from fuzzytree.rechecking.models import Rule, Variable
-from fuzzytree.rechecking.outcomes import UndecidedError, require
-from fuzzytree.rechecking.records import Answer, Proved
+from fuzzytree.rechecking.curves import ZERO, bounds, knots
+from fuzzytree.rechecking.models import Rule
+from fuzzytree.rechecking.outcomes import DoesNotHoldError, UndecidedError, require
+from fuzzytree.rechecking.records import Answer, Proved, Span, Witness
 from fuzzytree.rechecking.smt import all_of, any_of
 
 NEARLY = Fraction(1, 10**6)
@@ -55,24 +55,11 @@ def statements(case: Case, answer: Answer) -> list[Statement]:
     """
     if answer.message not in CLAIMS:
         raise UndecidedError("no solver of lines and polynomials is asked for it")
-    every = CLAIMS[answer.message](case, answer)
-    result = [*itertools.islice(every, _MOST + 1)]
+    claims = CLAIMS[answer.message](case, answer)
+    result = [*itertools.islice(claims, _MOST + 1)]
     if len(result) > _MOST:
         raise UndecidedError(f"more than {_MOST:,} claims")
     return result
-
-
-def _over(case: Case, number: int, rivals: Iterable[int], sign: str = ">") -> list[str]:
-    """Return that a rule fires, and is above rivals."""
-    own = case.symbol(number)
-    return [f"(> {own} 0.0)", *(f"({sign} {own} {case.symbol(n)})" for n in rivals)]
-
-
-def _rivals(case: Case, answer: Answer, every: list[int]) -> list[int]:
-    """Return the rivals that suffice for a proof; all if it names none."""
-    named = answer.state.rivals if isinstance(answer.state, Proved) else ()
-    require({*named} <= {*every}, "a rival that is none")
-    return [*named] or every
 
 
 def _names(case: Case, numbers: Iterable[int]) -> str:
@@ -83,14 +70,16 @@ def _names(case: Case, numbers: Iterable[int]) -> str:
 
 
 def never_wins(case: Case, answer: Answer) -> Statements:
-    """Claim that rivals are nowhere weaker than a rule."""
+    """Claim that rivals, those that the proof names or all, are nowhere weaker."""
     (number,) = answer.rules
-    others = case.rivals(number)
+    rivals = case.rivals(number)
     if answer.code == "FT103":
-        others = [n for n in case.numbers if n != number]
-    rivals = _rivals(case, answer, others)
+        rivals = [n for n in case.numbers if n != number]
+    if isinstance(answer.state, Proved) and answer.state.rivals:
+        require({*answer.state.rivals} <= {*rivals}, "a rival that is none")
+        rivals = [*answer.state.rivals]
     text = f"{case.name(number)} is nowhere stronger than {_names(case, rivals)}"
-    yield Statement(text, all_of(_over(case, number, rivals)))
+    yield Statement(text, case.over(number, rivals))
 
 
 def never_fires(case: Case, answer: Answer) -> Statements:
@@ -125,16 +114,12 @@ def path_to(case: Case, number: int) -> str:
     for node, place in case.model.paths[number - 1]:
         own = case.script.value(case.model.variables[node["ask"]])
         cuts = [case.script.number(Fraction(cut)) for cut in node["cuts"]]
-        ends = zip(["", *cuts], [*cuts, ""], node["interval owners"], strict=True)
-        ways = (
-            all_of(
-                ([f"(> {own} {low})"] if low else [])
-                + ([f"(<= {own} {high})"] if high else [])
-            )
-            for low, high, owner in ends
-            if owner == place + 1
+        above = ["true", *(f"(> {own} {cut})" for cut in cuts)]
+        below = [*(f"(<= {own} {cut})" for cut in cuts), "true"]
+        ends = zip(above, below, node["interval owners"], strict=True)
+        formulas.append(
+            any_of(all_of([low, high]) for low, high, to in ends if to == place + 1)
         )
-        formulas.append(any_of(ways))
     return all_of(formulas)
 
 
@@ -144,25 +129,22 @@ def dead_leaf(case: Case, answer: Answer) -> Statements:
     yield Statement(f"nothing leads to leaf {number}", path_to(case, number))
 
 
-def reached_leaves(case: Case, answer: Answer) -> Statements:
+def live_leaves(case: Case, answer: Answer) -> Statements:
     """Claim that values lead to each leaf without a finding."""
-    dead = {one.rules[0] for one in case.coded("FT101.leaf-")}
+    dead = {o.rules[0] for o in case.coded("FT101.leaf-")}
     count = len(case.numbers)
     is_so = (answer.facts["live"], answer.facts["leaves"]) == (count - len(dead), count)
     require(is_so, "other leaves are reached")
-    seen = {case.model.leaf_at(point) for point, _ in case.known}
-    for number in case.numbers:
-        if number not in dead | seen:
-            yield Statement(
-                f"values lead to leaf {number}", path_to(case, number), "sat"
-            )
+    for number in {*case.numbers} - dead:
+        text = f"values lead to leaf {number}"
+        yield Statement(text, path_to(case, number), "sat")
 
 
-def one_class(case: Case, answer: Answer) -> Statements:
+def same_class(case: Case, answer: Answer) -> Statements:
     """Claim that one class is decided everywhere, apart from exact ties."""
     label = answer.facts.get("then")
-    own = case.own(str(label)) if label is not None else []
-    others = (all_of(_over(case, n, own)) for n in case.numbers if n not in own)
+    own = case.own(label)
+    others = (case.over(n, own) for n in case.numbers if n not in own)
     yield Statement(f"no class is decided but {label!r}", any_of(others))
     if case.rules.uncovered != label:
         yield _no_gap(case)
@@ -175,87 +157,70 @@ def hidden(case: Case, answer: Answer) -> Statements:
     """Claim that some rules are nowhere weaker than the first one."""
     weak, *strong = answer.rules
     is_alike = answer.code == "FT104"
-    count = answer.measure(f"rules that {'subsume' if is_alike else 'mask'} it")
-    require(count == len(strong), "their number is another one")
     for number in strong:
-        is_one = case.then(number) == case.then(weak)
-        require(is_one is is_alike, "the classes are not so")
+        is_same = case.then(number) == case.then(weak)
+        require(is_same is is_alike, "the classes are not so")
         text = f"{case.name(weak)} is nowhere stronger than {case.name(number)}"
-        yield Statement(text, all_of(_over(case, weak, [number])))
+        yield Statement(text, case.over(weak, [number]))
     is_before = is_alike or (strong[0] < weak) is (answer.message == "FT105.masked")
     require(is_before, "the order of the rules is another one")
 
 
 def no_other_hidden(case: Case, answer: Answer) -> Statements:
     """Claim that each rule of other pairs is somewhere the stronger one."""
-    is_alike, fires = answer.code == "FT104", case.above[0]
-    pairs = [pair for pair in case.pairs(alike=is_alike) if {*pair} <= fires]
-    counts = answer.measure("pairs"), answer.measure("rules that never fire")
-    if counts != (len(pairs), len(case.numbers) - len(fires)):
-        raise UndecidedError("rules that fire only where no point is known")
+    is_alike, live = answer.code == "FT104", case.live()
+    pairs = [pair for pair in case.pairs(alike=is_alike) if {*pair} <= live]
+    if answer.measure("pairs") != len(pairs):
+        raise UndecidedError("which rules never fire is not known")
     listed = case.coded("FT104.sub") if is_alike else case.coded("FT105.")
-    known = {(one.rules[0], n) for one in listed for n in one.rules[1:]}
+    hides = {(o.rules[0], n) for o in listed for n in o.rules[1:]}
     for pair in pairs:
-        if pair in known or pair[::-1] in known:
+        if pair in hides or pair[::-1] in hides:
             continue
-        for first, second in (pair, pair[::-1]) if is_alike else (pair,):
-            if second not in case.above[first]:
-                text = f"{case.name(second)} is somewhere above {case.name(first)}"
-                yield Statement(text, all_of(_over(case, second, [first])), "sat")
+        for weak, strong in (pair, pair[::-1]) if is_alike else (pair,):
+            if not case.is_above(strong, weak):
+                text = f"{case.name(strong)} is somewhere above {case.name(weak)}"
+                yield Statement(text, case.over(strong, [weak]), "sat")
 
 
-def _apart(case: Case, one: int, other: int) -> str:
+def _apart(case: Case, a: int, b: int) -> str:
     """Return that the degrees of two rules differ on some axis."""
-    both = [
-        case.script.on_axes(case.rules.rules[n - 1], case.rules) for n in (one, other)
-    ]
-    off, formulas = case.script.number(NEARLY), []
-    for name in dict.fromkeys([*both[0], *both[1]]):
-        a, b = (of.get(name, "1.0") for of in both)
-        if a != b:
-            formulas += [f"(> {a} (+ {b} {off}))", f"(> {b} (+ {a} {off}))"]
-    return any_of(formulas)
+    rules = [case.rules.rules[n - 1] for n in (a, b)]
+    axes = [case.script.on_axes(rule, case.rules) for rule in rules]
+    off = case.script.number(NEARLY)
+    both = [[of.get(n, "1.0") for of in axes] for n in {**axes[0], **axes[1]}]
+    every = [(p, q) for x, y in both if x != y for p, q in ((x, y), (y, x))]
+    return any_of(f"(> {p} (+ {q} {off}))" for p, q in every)
 
 
 def same(case: Case, answer: Answer) -> Statements:
     """Claim that two rules have nearly the same antecedent."""
-    is_one = case.then(answer.rules[0]) == case.then(answer.rules[1])
-    kind = "contradiction" if case.model.form != "system" else "different"
-    wanted = f"FT106.{'same' if is_one else kind}"
-    require(answer.message == wanted, "the classes are not so")
+    is_same = case.then(answer.rules[0]) == case.then(answer.rules[1])
+    require(is_same is (answer.message == "FT106.same"), "the classes are not so")
     text = f"the degrees of {_names(case, answer.rules)} differ nowhere by 1e-6"
     yield Statement(text, _apart(case, *answer.rules))
 
 
 def no_others_same(case: Case, answer: Answer) -> Statements:
     """Claim that the antecedents of all other pairs differ."""
-    pairs = case.pairs()
-    require(answer.measure("pairs") == len(pairs), f"there are {len(pairs)} pairs")
-    rest = {*pairs} - {one.rules for one in case.coded("FT106.")}
     off = len(case.model.variables) * NEARLY if case.rules.is_product else NEARLY
-    for _, every in case.known:
-        rest = {
-            (one, other)
-            for one, other in rest
-            if every[one - 1][0] <= every[other - 1][1] + off
-            and every[other - 1][0] <= every[one - 1][1] + off
-        }
-    for one, other in sorted(rest):
-        text = f"{case.name(one)} and {case.name(other)} differ somewhere"
-        formula, is_sure = _apart(case, one, other), not case.rules.is_product
-        yield Statement(text, formula, "sat", is_sure)
+    for a, b in sorted({*case.pairs()} - {o.rules for o in case.coded("FT106.")}):
+        sides = [(s[a - 1], s[b - 1]) for _, s in case.samples]
+        if all(x[0] <= y[1] + off and y[0] <= x[1] + off for x, y in sides):
+            text = f"{case.name(a)} and {case.name(b)} differ somewhere"
+            is_sure = not case.rules.is_product
+            yield Statement(text, _apart(case, a, b), "sat", is_sure)
 
 
 def without(case: Case, answer: Answer) -> Rule:
     """Return the rule of an answer without the proposition that it is about."""
     rule = case.rules.rules[answer.rules[0] - 1]
-    labels = [tuple(one) for one in answer.terms]
+    labels = [tuple(label) for label in answer.terms]
     for place, proposition in enumerate(rule.when):
         is_it = [(proposition.variable, term) for term in proposition.terms] == labels
         if is_it and answer.facts.get("proposition") == str(proposition):
             return rule._replace(when=(*rule.when[:place], *rule.when[place + 1 :]))
-    require(False, "it is of no proposition of the rule")
-    raise AssertionError
+    raise DoesNotHoldError("it is of no proposition of the rule")
 
 
 def irrelevant(case: Case, answer: Answer) -> Statements:
@@ -265,52 +230,27 @@ def irrelevant(case: Case, answer: Answer) -> Statements:
     """
     (number,) = answer.rules
     name = f"{case.name(number)} without {answer.facts['proposition']}"
+    symbols = [*map(case.symbol, case.numbers)]
     rest = case.script.add_rule(name, without(case, answer), case.rules)
-    own, rivals = case.own(case.then(number)), case.rivals(number)
-    bare = [f"(<= {case.symbol(n)} 0.0)" for n in case.numbers]
-    is_covered = case.rules.uncovered == case.then(number)
+    others = [*symbols[: number - 1], rest, *symbols[number:]]
+    bare = all_of(f"(<= {own} 0.0)" for own in symbols)
+    text = f"{name} decides the same"
     for is_strict in (True, False):
-        over = [f"(> {rest} 0.0)"]
-        for n in rivals:
-            sign = ">" if is_strict or n < number else ">="
-            over.append(f"({sign} {rest} {case.symbol(n)})")
-        other = [
-            all_of(
-                f"({'>' if is_strict or k < n else '>='} {case.symbol(n)} "
-                f"{case.symbol(k)})"
-                for k in own
-            )
-            for n in rivals
-        ]
-        fires = any_of(f"(> {case.symbol(n)} 0.0)" for n in rivals)
-        ways = [all_of([fires, any_of(other)])] + [all_of(bare)] * (not is_covered)
-        text = f"{name} decides the same"
-        if is_strict:
-            text += ", apart from exact ties"
-        yield Statement(text, all_of([*over, any_of(ways)]), is_sure=is_strict)
+        ways = [case.wins(n, symbols, is_strict=is_strict) for n in case.rivals(number)]
+        ways += [bare] * (case.rules.uncovered != case.then(number))
+        formula = all_of([case.wins(number, others, is_strict=is_strict), any_of(ways)])
+        tail = ", apart from exact ties" if is_strict else ""
+        yield Statement(text + tail, formula, is_sure=is_strict)
 
 
 def apart(case: Case, answer: Answer) -> Statements:
     """Claim that no pair without a finding reaches the level together."""
     level = Fraction(case.settings.level)
-    listed = {one.rules for one in case.coded("FT201.") if one.rules}
-    rest = conflicting_pairs(case) - listed
-    omitted, clean = (
-        answer.measure(f"pairs {which}") for which in ("not listed", "that never do")
-    )
-    require(clean == len(rest) - omitted, "their number is another one")
+    rest = case.conflicts() - {o.rules for o in case.coded("FT201.")}
+    omitted = int(answer.measure("pairs not listed"))
+    _count(answer, "pairs that never do", len(rest) - omitted)
     if omitted:
-        points = [strengths for _, strengths in case.known]
-        meet = {
-            (a, b)
-            for a, b in rest
-            if any(min(s[a - 1][0], s[b - 1][0]) >= level for s in points)
-        }
-        if len(meet) < omitted:
-            raise UndecidedError("which pairs are left out is not known")
-        rest -= meet
-        omitted -= len(meet)
-    require(omitted >= 0, "more pairs reach the level together")
+        raise UndecidedError("which pairs are left out is not known")
     for pair in sorted(rest):
         formula = all_of(case.reaches(n, ">=", level) for n in pair)
         text = f"{_names(case, pair)} never reach {float(level):g} together"
@@ -322,20 +262,6 @@ def no_higher(case: Case, answer: Answer) -> Statements:
     high = Fraction(answer.measures[-1].value) + _ROUNDED
     text = f"{_names(case, answer.rules)} reach no more than {float(high):g} together"
     yield Statement(text, all_of(case.reaches(n, ">", high) for n in answer.rules))
-
-
-def ties(case: Case, answer: Answer) -> Statements:
-    """Check the number of pairs that tie; that others do not is not decided."""
-    listed = len(case.coded("FT202.tie"))
-    _count(answer, pairs=len(case.pairs(alike=False)), pairs_listed=listed)
-    raise UndecidedError("ties on more than a surface")
-    yield
-
-
-def conflicting_pairs(case: Case) -> set[tuple[int, int]]:
-    """Return the pairs of rules that say different things of one output."""
-    pairs = case.pairs(alike=False)
-    return {pair for pair in pairs if case.model.may_conflict(*pair)}
 
 
 # --- where no rule fires
@@ -372,223 +298,160 @@ def covers(case: Case, answer: Answer) -> Statements:
         yield Statement(text, all_of(weak))
 
 
+def _beyond(case: Case, span: Span, way: float) -> Iterator[str]:
+    """Yield that a variable is outside a span, made wider or narrower by doubles."""
+    own = case.script.value(case.model.variables[span.variable])
+    for end, sign, far in ((span.low, "<", -way), (span.high, ">", way)):
+        if end is not None:
+            moved = end if span.low == span.high else math.nextafter(end, far)
+            yield f"({sign} {own} {case.script.number(Fraction(moved))})"
+
+
+def within(case: Case, answer: Answer) -> Statements:
+    """Claim that what an answer says of its witness is so in all of its region."""
+    spans = answer.state.region if isinstance(answer.state, Witness) else ()
+    outside = [f for span in spans for f in _beyond(case, span, -math.inf)]
+    if answer.code == "FT205":
+        wrong = f"(not {path_to(case, answer.rules[0])})"
+    else:
+        is_weak = answer.message == "FT301.weak"
+        level = Fraction(case.settings.epsilon) if is_weak else ZERO
+        sign = ">=" if is_weak else ">"
+        wrong = any_of(case.reaches(n, sign, level) for n in case.numbers)
+        yield from covers(case, answer) if is_weak else ()
+    text = f"{answer.subject} is so in all of its region"
+    yield Statement(text, all_of([f"(not {any_of(outside)})", wrong]))
+
+
 def no_more_gaps(case: Case, gaps: list[Answer]) -> Statement:
     """Claim that no rule-free part of the domain lies outside of the listed gaps."""
-    beside = []
-    for gap in gaps:
-        sides = []
-        for span in gap.region:
-            own = case.script.value(case.model.variables[span.variable])
-            if span.low is not None:
-                low = Fraction(math.nextafter(span.low, -math.inf))
-                sides.append(f"(< {own} {case.script.number(low)})")
-            if span.high is not None:
-                high = Fraction(math.nextafter(span.high, math.inf))
-                sides.append(f"(> {own} {case.script.number(high)})")
-        beside.append(any_of(sides))
-    return _no_gap(case, beside)
+    every = (
+        any_of(f for span in gap.region for f in _beyond(case, span, math.inf))
+        for gap in gaps
+    )
+    return _no_gap(case, [*every])
 
 
-# --- terms
+# --- terms, and what is counted
 
 
 def low_term(case: Case, answer: Answer) -> Statements:
     """Claim that a term is nowhere above the reported height, and below the level."""
-    variable, term = (
-        case.model.variables[answer.terms[0].variable],
-        answer.terms[0].term,
-    )
-    height, level = answer.measure("height"), Fraction(case.settings.level)
-    is_empty = answer.message == "FT401.empty"
-    require(is_empty is (not height), "it is empty, or is not")
-    low, high = case.ends(variable)
-    ends = answer.facts["low"], answer.facts["high"]
-    require(ends == (float(low), float(high)), "the range is another one")
+    (label,) = answer.terms
+    height, level = answer.measure("height"), case.settings.level
+    require((answer.message == "FT401.empty") is (not height), "it is not empty")
+    degree = case.script.degree(case.model.variables[label.variable], label.term)
     most = case.script.number(Fraction(height) + (_ROUNDED if height else 0))
-    degree = case.script.degree(variable, term)
+    over = [f"(> {degree} {most})"]
+    over.append(f"(>= {degree} {case.script.number(Fraction(level))})")
     text = (
-        f"{variable.name} is {term} is nowhere above {height:g}, nor {float(level):g}"
+        f"{label.variable} is {label.term} is nowhere above {height:g}, nor {level:g}"
     )
-    over = [f"(> {degree} {most})", f"(>= {degree} {case.script.number(level)})"]
     yield Statement(text, any_of(over))
 
 
 def heights(case: Case, answer: Answer) -> Statements:
     """Claim that all terms without a finding reach the level."""
     level = Fraction(case.settings.level)
-    listed = {tuple(one.terms[0]) for one in case.coded("FT401.") if one.terms}
-    count = 0
-    for variable in case.model.variables.values():
-        for term, curve in variable.curves.items():
-            if (variable.name, term) in listed or curve.kind == "formula":
-                continue
-            count += 1
-            if _height(case, variable, curve) < level:
-                degree, at_least = case.script.degree(variable, term), level
-                formula = f"(>= {degree} {case.script.number(at_least)})"
-                text = f"{variable.name} is {term} reaches {float(level):g}"
-                yield Statement(text, formula, "sat")
-    require(answer.facts["count"] == count, "other terms reach it")
+    rest = [label for label in _rest(case, answer) if _is_evaluated(case, label)]
+    require(answer.facts["count"] == len(rest), "other terms reach it")
+    for name, term in rest:
+        variable = case.model.variables[name]
+        curve, (low, high) = variable.curves[term], case.ends(variable)
+        ends = [low, high, *(x for x in knots(curve) if low < x < high)]
+        if all(bounds(curve, x, x)[0] < level for x in ends):
+            degree = case.script.degree(variable, term)
+            formula = f"(>= {degree} {case.script.number(level)})"
+            text = f"{name} is {term} reaches {float(level):g}"
+            yield Statement(text, formula, "sat")
 
 
-def _height(case: Case, variable: Variable, curve: Curve) -> Fraction:
-    """Return the largest degree at the ends of the domain and where a curve changes."""
-    low, high = case.ends(variable)
-    ends = [low, high, *(x for x in knots(curve) if low < x < high)]
-    return max(bounds(curve, x, x)[0] for x in ends)
+def _is_evaluated(case: Case, label: tuple[str, str]) -> bool:
+    return case.model.variables[label[0]].curves[label[1]].kind != "formula"
 
 
-def plain_terms(case: Case) -> list[tuple[Variable, str, Curve]]:
-    """Return the terms whose curves are compared with each other."""
-    aside = {tuple(t) for one in case.coded("FTD.") for t in one.terms}
-    return [
-        (variable, term, curve)
-        for variable in case.model.variables.values()
-        for term, curve in variable.curves.items()
-        if (variable.name, term) not in aside
-    ]
+def _rest(case: Case, answer: Answer) -> list[tuple[str, str]]:
+    """Return the terms without a finding of an answer's code."""
+    listed = {tuple(o.terms[0]) for o in case.coded(f"{answer.code}.") if o.terms}
+    return [label for label in case.model.labels if label not in listed]
 
 
-def well_shaped(case: Case, answer: Answer) -> Statements:
-    """Check the number of terms without a finding; their shapes are not decided."""
-    listed = {tuple(one.terms[0]) for one in case.coded("FT402.") if one.terms}
-    count = len(plain_terms(case)) - len(listed)
-    require(answer.facts["count"] == count, "other terms are well shaped")
-    raise UndecidedError("the shapes of terms")
-    yield
-
-
-def subnormal(case: Case, answer: Answer) -> Statements:
-    """Check the largest degree of a term that does not reach 1."""
-    curve = case.model.variables[answer.terms[0].variable].curves[answer.terms[0].term]
-    if not is_straight(curve):
-        raise UndecidedError("the largest degree of a curve that is no line")
-    top = max(curve.numbers[1]) if curve.kind == "points" else 1
-    most = float(Fraction(top) * curve.height)
-    is_so = math.isclose(answer.measure("largest degree"), most) and most < 1
-    require(is_so, f"the largest degree is {most:.6g}")
-    yield from ()
-
-
-def overlaps(case: Case, answer: Answer) -> Statements:
-    """Check the number of pairs of terms; their areas are not integrated."""
-    every = itertools.combinations(plain_terms(case), 2)
-    count = sum(one[0].name == other[0].name for one, other in every)
+def counted(case: Case, answer: Answer) -> Statements:
+    """Check that findings and the rest are everything; the rest is not decided."""
+    aside = {tuple(label) for o in case.coded("FTD.") for label in o.terms}
+    listed = len([o for o in case.coded(f"{answer.code}.") if o.terms or o.rules])
+    if answer.code == "FT202":
+        _count(answer, "pairs", len(case.pairs(alike=False)))
+        _count(answer, "pairs listed", listed)
+        raise UndecidedError("ties on more than a surface")
+    if answer.code == "FT402":
+        count = len([label for label in _rest(case, answer) if label not in aside])
+        require(answer.facts["count"] == count, "other terms are well shaped")
+        raise UndecidedError("the shapes of terms")
+    names = [name for name, term in case.model.labels if (name, term) not in aside]
+    pairs = sum(a == b for a, b in itertools.combinations(names, 2))
     kinds = ("apart", "not listed", "without area")
     rest = sum(answer.measure(f"pairs {kind}") for kind in kinds)
-    listed = len([one for one in case.coded("FT403.") if one.terms])
-    require(count == rest + listed, f"there are {count} pairs of terms")
+    require(pairs == rest + listed, f"there are {pairs} pairs of terms")
     raise UndecidedError("areas of terms")
     yield
 
 
 def unused(case: Case, answer: Answer) -> Statements:
     """Check that the findings are the terms and variables that no rule uses."""
-    model, used = case.model, case.model.asked
-    needed = {variable for variable, _ in used}
+    model, labels = case.model, case.model.asked
+    names = {variable for variable, _ in labels}
     for variable in model.variables.values():
-        if variable.name in needed:
-            needed |= {name for name, *_ in variable.parts}
-    idle = [f"variable {name!r}" for name in model.variables if name not in needed]
-    rest = [pair for pair in model.labels if pair[0] in needed and pair not in used]
+        if variable.name in names:
+            names |= {name for name, *_ in variable.parts}
+    idle = [f"variable {name!r}" for name in model.variables if name not in names]
+    rest = [pair for pair in model.labels if pair[0] in names and pair not in labels]
     idle += [f"term {term!r} of {name!r}" for name, term in rest]
-    listed = [one.subject for one in case.coded("FT404.unused")]
+    listed = [o.subject for o in case.coded("FT404.unused")]
     require(listed == idle, "other terms or variables are unused")
-    if answer.message == "FT404.used":
-        counts = needed.intersection(model.variables), used.intersection(model.labels)
-        _count(answer, variables_in_use=len(counts[0]), terms_in_use=len(counts[1]))
     yield from ()
 
 
-def _count(answer: Answer, **counts: float) -> None:
-    """Refuse an answer whose measures are other counts than these."""
-    for name, count in counts.items():
-        name = name.replace("_", " ")
-        require(answer.measure(name) == count, f"{name}: {count:g} are counted here")
+def _count(answer: Answer, name: str, count: int) -> None:
+    """Refuse an answer whose measure is another count."""
+    require(answer.measure(name) == count, f"{name}: {count} are counted here")
 
 
-def size(case: Case, answer: Answer) -> None:
-    """Check the counts of rules, propositions and terms."""
-    lengths = case.model.lengths
-    propositions = [[c for c in rule.when if any(c.terms)] for rule in case.rules.rules]
-    used = {(c.variable, t) for when in propositions for c in when for t in c.terms}
-    _count(
-        answer,
-        rules=len(lengths),
-        propositions=sum(lengths),
-        most_propositions_of_a_rule=max(lengths),
-        propositions_per_rule=sum(lengths) / len(lengths),
-        distinct_terms_in_use=len(used),
-        variables_in_use=len({variable for variable, _ in used}),
-    )
-    if case.model.form == "tree":
-        _count(answer, depth_of_the_tree=max(map(len, case.model.paths)))
-    names = {one.name: one.value for one in answer.measures}
-    if "index of Nauck" in names:
-        parts = (names[f"{one} of Nauck"] for one in ("complexity", "coverage"))
-        product = math.prod(parts) * names["partition of Nauck"]
-        is_near = math.isclose(names["index of Nauck"], product, rel_tol=1e-9)
-        require(is_near, f"the index of Nauck is {product:.6g}")
-
-
-CLAIMS: dict[str, Callable[[Case, Answer], Statements]] = {
-    "FT101.never-wins": never_wins,
-    "FT101.may-decide-by-place": never_wins,
-    "FT101.never-fires": never_fires,
-    "FT101.weight-0": silent,
-    "FT101.never-true": silent,
-    "FT101.leaves": reached_leaves,
-    "FT101.leaf-excluded": dead_leaf,
-    "FT101.leaf-outside": dead_leaf,
-    "FT101.leaf-unmet": dead_leaf,
-    "FT103.superfluous": never_wins,
-    "FT104.subsumed": hidden,
-    "FT104.others": no_other_hidden,
-    "FT105.masked": hidden,
-    "FT105.weaker": hidden,
-    "FT105.others": no_other_hidden,
-    "FT106.same": same,
-    "FT106.contradiction": same,
-    "FT106.different": same,
-    "FT106.others": no_others_same,
-    "FT107.irrelevant": irrelevant,
-    "FT107.silent": never_fires,
-    "FT201.never": apart,
-    "FT201.unlisted": apart,
-    "FT202.others": ties,
-    "FT204.alike": one_class,
-    "FT301.fires": fires,
-    "FT301.reaches": covers,
-    "FT401.reached": heights,
-    "FT401.low": low_term,
-    "FT401.empty": low_term,
-    "FT402.sound": well_shaped,
-    "FT402.subnormal": subnormal,
-    "FT403.others": overlaps,
-    "FT403.unlisted": overlaps,
-    "FT404.unused": unused,
-    "FT404.used": unused,
+Claims = Callable[[Case, Answer], Statements]
+_MESSAGES: dict[Claims, str] = {
+    never_wins: "FT101.never-wins FT101.may-decide-by-place FT103.superfluous",
+    never_fires: "FT101.never-fires FT107.silent",
+    silent: "FT101.weight-0 FT101.never-true",
+    live_leaves: "FT101.leaves",
+    dead_leaf: "FT101.leaf-excluded FT101.leaf-outside FT101.leaf-unmet",
+    hidden: "FT104.subsumed FT105.masked FT105.weaker",
+    no_other_hidden: "FT104.others FT105.others",
+    same: "FT106.same FT106.contradiction FT106.different",
+    no_others_same: "FT106.others",
+    irrelevant: "FT107.irrelevant",
+    apart: "FT201.never FT201.unlisted",
+    same_class: "FT204.alike",
+    fires: "FT301.fires",
+    covers: "FT301.reaches",
+    heights: "FT401.reached",
+    low_term: "FT401.low FT401.empty",
+    counted: "FT202.others FT402.sound FT403.others FT403.unlisted",
+    unused: "FT404.unused FT404.used",
 }
+CLAIMS = {name: claims for claims, names in _MESSAGES.items() for name in names.split()}
 """The claims of each message that can be PROVED, or how reading decides it."""
 
-BOUNDS: dict[str, Callable[[Case, Answer], Statements]] = {
-    "FT102.marginal": no_lead,
-    "FT102.between": no_lead,
-    "FT201.conflict": no_higher,
-    "FT201.may": no_higher,
-    "FT301.weak": covers,
+BOUNDS: dict[str, Claims] = {
+    **dict.fromkeys(("FT102.marginal", "FT102.between"), no_lead),
+    **dict.fromkeys(("FT201.conflict", "FT201.may"), no_higher),
+    **dict.fromkeys(("FT301.gap", "FT301.gap-with-class"), within),
+    **dict.fromkeys(("FT205.region", "FT301.gap-of-system", "FT301.weak"), within),
 }
 """What answers with a bracket or a witness claim of all of the domain."""
 
 PROVABLE = (
     *CLAIMS,
-    *("FT107.more", "FT203.leaves", "FT402.outside", "FT402.peaks"),
+    *("FT107.more", "FT203.leaves", "FT402.outside", "FT402.peaks", "FT402.subnormal"),
     *("FT403.equal", "FT403.within", "FT403.similar"),
 )
 """The messages of answers that must be PROVED, but for those that may be open."""
-
-
-def bound_statements(case: Case, answer: Answer) -> list[Statement]:
-    """Return the claims of an answer with a bracket or a witness; mostly none."""
-    known = BOUNDS.get(answer.message)
-    return [] if known is None else [*known(case, answer)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -36,19 +36,20 @@ class Report:
     Attributes:
         unchecked: What is read and compared with nothing.
         wrong: What does not hold, a sentence each.
+        refuted: By position why an answer does not hold.
         counts: How often each kind of check was made.
         undecided: The positions of the answers not decided again, by state and reason.
-        codes: The code of each answer.
+        answers: The answers that are checked.
         confirmed: By position what confirms each answer: a solver, or `recheck`.
         unconfirmed: How many answers PROVED only a solver can confirm, without one.
     """
 
-    def __init__(self, unchecked: str = "") -> None:
-        self.unchecked = unchecked
+    def __init__(self, unchecked: str, answers: Sequence[Any]) -> None:
+        self.unchecked, self.answers = unchecked, answers
         self.wrong: list[str] = []
+        self.refuted: dict[int, str] = {}
         self.counts = Counter[str]()
         self.undecided = defaultdict[tuple[str, str], list[int]](list)
-        self.codes: list[str] = []
         self.confirmed: dict[int, str] = {}
         self.unconfirmed = 0
 
@@ -69,19 +70,23 @@ class Report:
         try:
             yield
         except DoesNotHoldError as error:
-            self.wrong.append(f"{where}: {error}")
+            self._refute(number, where, str(error))
         except UndecidedError as error:
             kind = type(answer.state).__name__.upper()
             self.undecided[kind, str(error)].append(number - 1)
-        except (
-            LookupError,
-            ArithmeticError,
-            ValueError,
-            TypeError,
-            AttributeError,
-            AssertionError,
-        ):
-            self.wrong.append(f"{where}: it names what there is not")
+        except (LookupError, ArithmeticError, ValueError, TypeError, AttributeError):
+            self._refute(number, where, "it names what there is not")
+
+    def _refute(self, number: int, where: str, why: str) -> None:
+        self.wrong.append(f"{where}: {why}")
+        self.refuted.setdefault(number - 1, why)
+
+    def confirm(self, number: int, by: str, *, is_bound: bool = False) -> None:
+        """Note that a solver, or reading alone, confirms an answer or bounds of it."""
+        kind = "bounds of other answers" if is_bound else "answers PROVED"
+        way = "read and evaluated again" if by == "recheck" else f"confirmed by {by}"
+        self.counts[f"{kind}, {way}"] += 1
+        self.confirmed[number - 1] = by
 
     def lines(self) -> Iterator[str]:
         """Yield the report, line by line."""
@@ -103,7 +108,7 @@ class Report:
             yield "not decided again:"
         for (_, why), numbers in self.undecided.items():
             size = f" ({len(numbers)} answers)" if len(numbers) > 1 else ""
-            codes = dict.fromkeys(self.codes[number] for number in numbers)
+            codes = dict.fromkeys(self.answers[number].code for number in numbers)
             yield f"  {', '.join(codes)}{size}: {why}"
         yield f"read, and compared with nothing: {self.unchecked}"
         if self.unconfirmed:

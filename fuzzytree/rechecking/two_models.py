@@ -7,16 +7,15 @@ units and notes. Whatever else is alike is not decided here.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
-from fractions import Fraction
+from typing import Any
 
 from fuzzytree.rechecking.case import Case, class_at, values_of
 from fuzzytree.rechecking.checks import (
     check_message,
     check_sample,
     check_source,
-    judge,
+    decide,
 )
 from fuzzytree.rechecking.claims import Statement
 from fuzzytree.rechecking.curves import Facts
@@ -35,7 +34,6 @@ from fuzzytree.rechecking.records import (
     read_json,
 )
 from fuzzytree.rechecking.smt import Script, all_of, any_of
-from fuzzytree.rechecking.solvers import ask
 
 UNCHECKED = "the version, the hashes of the models' contents, the table, the changes"
 Names = tuple[str, str, str]
@@ -53,8 +51,7 @@ def recheck_difference(
     """
     facts: Difference = built(Difference, read_json(diff, names[0]), names[0])
     both = (Case(facts, Model(old, names[1])), Case(facts, Model(new, names[2])))
-    report = Report(UNCHECKED)
-    report.codes = [one.code for one in facts.answers]
+    report = Report(UNCHECKED, facts.answers)
     for one, case, content, name in zip(
         (facts.old, facts.new), both, (old, new), names[1:], strict=True
     ):
@@ -62,52 +59,48 @@ def recheck_difference(
         check_source(report, one.file, content, name)
     is_changed = any(one.is_finding for one in facts.answers)
     breaks = any(one.grade == "breaking" for one in facts.changes)
-    known = [one for one in facts.answers if isinstance(one.state, Proved | Computed)]
+    sure = [o for o in facts.answers if isinstance(o.state, Proved | Computed)]
     is_open = any(isinstance(one.state, Bracket | Declined) for one in facts.answers)
-    is_equal = any(one.subject == "decisions" for one in known) and not is_open
+    is_equal = any(one.subject == "decisions" for one in sure) and not is_open
     verdict = "changed" if is_changed else "equal" if is_equal else "open"
     report.expect(facts.verdict == verdict, f"the verdict is {verdict}")
     is_ok = not is_changed and not breaks
     report.expect(facts.ok is is_ok, f"it is {'' if is_ok else 'not '}ok")
     for number, answer in enumerate(facts.answers, 1):
         with report.answer(number, answer):
-            _check_answer(both, report, answer, number, solver)
+            check_message(answer)
+            report.counts["sentences written again"] += 1
+            if isinstance(answer.state, Proved):
+                _check_proof(both, report, answer, number, solver)
+            else:
+                _check_state(both, report, answer)
     return report
 
 
-def _check_answer(
-    both: tuple[Case, Case], report: Report, answer: Answer, number: int, solver: str
-) -> None:
-    check_message(answer)
-    report.counts["sentences written again"] += 1
+def _check_state(both: tuple[Case, Case], report: Report, answer: Answer) -> None:
     state = answer.state
     if isinstance(state, Sampled):
         check_sample(state)
-        raise UndecidedError("a sample is not drawn again here")
-    if isinstance(state, Witness):
+    elif isinstance(state, Witness):
         _check_witness(both, state)
         report.counts["answers with a WITNESS, evaluated again"] += 1
-    elif isinstance(state, Proved):
-        if answer.subject != "decisions":
-            raise UndecidedError("one output of several")
-        if any(case.model.form == "system" for case in both):
-            _same_systems(*(case.model for case in both))
-            report.counts["answers PROVED, read and evaluated again"] += 1
-            report.confirmed[number - 1] = "recheck"
-            return
-        script, claims = difference_claims(both, str(answer.facts.get("where", "")))
-        results = ask(script.text(), claims, solver)
-        if not results.solver:
-            report.unconfirmed += 1
-            return
-        pairs = zip(claims, results.answers, strict=True)
-        judge(pairs, is_exact=script.is_exact)
-        report.counts[f"answers PROVED, confirmed by {results.solver}"] += 1
-        report.confirmed[number - 1] = results.solver
     elif isinstance(state, Computed):
         report.counts["answers COMPUTED, not decided again"] += 1
     else:
         raise UndecidedError("what is open is not looked at here")
+
+
+def _check_proof(
+    both: tuple[Case, Case], report: Report, answer: Answer, number: int, solver: str
+) -> None:
+    if answer.subject != "decisions":
+        raise UndecidedError("one output of several")
+    if any(case.model.form == "system" for case in both):
+        _same_systems(*(case.model for case in both))
+        report.confirm(number, "recheck")
+    else:
+        script, claims = difference_claims(both, str(answer.facts.get("where", "")))
+        decide(script, report, [(number, answer, claims)], solver)
 
 
 def _check_witness(both: tuple[Case, Case], state: Witness) -> None:
@@ -116,16 +109,16 @@ def _check_witness(both: tuple[Case, Case], state: Witness) -> None:
     inputs = {name for case in both for name in case.inputs}
     require(point.keys() == inputs, "the point does not have a value of every input")
     require(all(case.is_within(point) for case in both), "it lies outside the domain")
-    said = {claim.of: claim.label for claim in state.claims if claim.kind == "decides"}
-    if not said:
+    classes = {c.of: c.label for c in state.claims if c.kind == "decides"}
+    if not classes:
         raise UndecidedError("numbers of outputs are not computed here")
-    require(said.keys() == {"old", "new"}, "it is not claimed what both predict")
-    require(said["old"] != said["new"], "both predict the same")
+    require(classes.keys() == {"old", "new"}, "it is not claimed what both predict")
+    require(classes["old"] != classes["new"], "both predict the same")
     if any(case.model.form == "system" for case in both):
         raise UndecidedError("a system that stands for rules")
     predicted = [class_at(case.rules, point) for case in both]
     text = f"the models predict {predicted[0]!r} and {predicted[1]!r}"
-    require(predicted == [said["old"], said["new"]], text)
+    require(predicted == [classes["old"], classes["new"]], text)
 
 
 # --- what is alike
@@ -140,9 +133,7 @@ def difference_claims(
     """
     script = Script()
     for case, of in zip(both, ("old ", "new "), strict=True):
-        ends = {n: (Fraction(s.low), Fraction(s.high)) for n, s in case.sides.items()}
-        values = {name: side.points for name, side in case.sides.items() if where}
-        script.add(case.model, ends if where else {}, of, values)
+        case.add_to(script, of, is_bounded=bool(where))
     if "missing" not in where:
         require(both[0].model.missing == both[1].model.missing, "of missing values")
     return script, [*_claims(script, both)]
@@ -155,7 +146,7 @@ def _claims(script: Script, both: tuple[Case, Case]) -> Iterator[Statement]:
     )
     for is_strict in (True, False):
         wins = [
-            [_wins(case, symbols, n, is_strict=is_strict) for n in case.numbers]
+            [case.wins(n, symbols, is_strict=is_strict) for n in case.numbers]
             for case, symbols in zip(both, (old, new), strict=True)
         ]
         for n, way in enumerate(wins[0], 1):
@@ -183,38 +174,29 @@ def _claims(script: Script, both: tuple[Case, Case]) -> Iterator[Statement]:
     yield Statement(text, all_of([bare, any_of(others)]), is_sure=False)
 
 
-def _wins(case: Case, symbols: list[str], number: int, *, is_strict: bool) -> str:
-    """Return that a rule decides: as the first of the strongest, or strictly."""
-    own, formulas = symbols[number - 1], [f"(> {symbols[number - 1]} 0.0)"]
-    for n in case.rivals(number):
-        sign = ">" if is_strict or n < number else ">="
-        formulas.append(f"({sign} {own} {symbols[n - 1]})")
-    return all_of(formulas)
-
-
 def _same_systems(old: Model, new: Model) -> None:
     require(old.form == new.form, "one of them is no system")
     if _system_form(old.facts) != _system_form(new.facts):
         raise UndecidedError("systems that are not the same, one rule after the other")
 
 
-def _system_form(top: Facts) -> str:
+def _system_form(top: Facts) -> list[Any]:
     """Return a system's file without what is for people only."""
-    outputs = [_without(one, "unit") for one in top["outputs"]]
+    outputs = [_without(entry, "unit") for entry in top["outputs"]]
     inputs: list[Facts] = []
-    for one in top.get("variables", []):
-        is_free = "outside" not in one.get("range", {})
-        terms = {"terms": sorted(one.get("terms", []), key=repr)}
-        inputs.append(_without(one, "unit", *["range"] * is_free) | terms)
+    for entry in top.get("variables", []):
+        is_free = "outside" not in entry.get("range", {})
+        terms = {"terms": sorted(entry.get("terms", []), key=repr)}
+        inputs.append(_without(entry, "unit", *["range"] * is_free) | terms)
     if "'linear'" not in repr(outputs):  # whose weights are in the order of inputs
         inputs.sort(key=repr)
     blocks: list[Facts] = []
     for block in top["blocks"]:
-        rules = [one for one in block["rules"] if one.get("weight", 1)]
-        rules = [_without(one, "name") for one in rules]
+        rules = [_without(rule, "name") for rule in block["rules"]]
+        rules = [rule for rule in rules if rule.get("weight", 1)]
         blocks.append(_without(block, "name") | {"rules": rules})
-    return json.dumps([top["semantics"], inputs, outputs, blocks], sort_keys=True)
+    return [top["semantics"], inputs, outputs, blocks]
 
 
 def _without(facts: Facts, *names: str) -> Facts:
-    return {key: one for key, one in facts.items() if key not in names}
+    return {key: value for key, value in facts.items() if key not in names}

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import subprocess
 import sys
@@ -35,13 +36,14 @@ def test_an_audit_that_is_right_is_reported_with_what_was_checked(
     code, out, err = call("recheck", "audit.json", "grip.yaml")
     assert (code, err) == (0, "")
     verdict, *counts, nothing = out.splitlines()
-    assert counts == [
-        "answers PROVED, read and evaluated again  1",
-        "answers with a WITNESS, evaluated again   3",
-        "claims evaluated again                    3",
-        "facts about the audit                     12",
-        "points of regions                         39",
-        "sentences written again                   4",
+    lines = [re.split("  +", re.sub(r" z3 .*?  ", " z3  ", line)) for line in counts]
+    assert lines == [
+        ["answers PROVED, read and evaluated again", "1"],
+        ["answers with a WITNESS, evaluated again", "3"],
+        ["bounds of other answers, confirmed by z3", "3"],
+        ["claims evaluated again", "3"],
+        ["facts about the audit", "12"],
+        ["sentences written again", "4"],
     ]
     assert nothing.startswith(
         "read, and compared with nothing: the version, the hash of "

@@ -23,7 +23,16 @@ from fuzzytree.auditing.findings.records import AuditSelection
 from fuzzytree.auditing.findings.subject import AuditRows, Material
 from fuzzytree.exporters import yaml
 from fuzzytree.model import FuzzySystem
-from fuzzytree.model.rulebase import Conjunction, RuleBase
+from fuzzytree.model.rulebase import (
+    Conjunction,
+    Points,
+    Proposition,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.rechecking import CannotRunError, recheck
 from fuzzytree.rechecking.checks import digest_of
@@ -135,8 +144,8 @@ def test_a_real_audit_holds_and_its_proofs_are_confirmed() -> None:
     report = recheck(*small(), ("audit.json", "grip.yaml"))
     assert report.wrong == []
     assert {why for state, why in report.undecided if state == "PROVED"} <= HERE
-    assert len(report.confirmed) == 13
-    assert report.counts["sentences written again"] == len(report.codes)
+    assert len(report.confirmed) == 14
+    assert report.counts["sentences written again"] == len(report.answers)
 
 
 @pytest.mark.one_in(2)
@@ -278,6 +287,22 @@ def test_a_witness_outside_the_domain_is_reported() -> None:
     one["state"]["point"][0] |= {"exact": "9", "decimal": "9.0", "hex": (9.0).hex()}
     text = f"{where}: the point lies outside the domain"
     assert changed(answers=answers) == [text]
+
+
+def test_a_value_between_two_categories_is_outside_the_domain() -> None:
+    term = Term("cold", Points((0.0, 2.0), (0.0, 1.0)))
+    colour = Variable("colour", (term,), categories=("blue", "green", "red"))
+    rule = Rule((Proposition("colour", ("cold",)),), "a")
+    model = RuleBase("colours", ("a",), (colour,), (rule,), Semantics())
+    text, content = audited(model, select=["FT101"], skip=[])
+    facts = json.loads(text)
+    assert wrong_with(facts, content) == []
+    (answer,) = facts["answers"]
+    half = {"exact": "3/2", "decimal": "1.5", "hex": (1.5).hex(), "word": ""}
+    answer["state"]["point"][0] |= half
+    facts["digest"] = digest_of(facts)
+    (why,) = wrong_with(facts, content)
+    assert why.endswith("the point lies outside the domain")
 
 
 def test_the_audit_with_rows_that_are_no_table_holds() -> None:

@@ -36,6 +36,7 @@ from fuzzytree.rechecking import CannotRunError, model_text, recheck
 from fuzzytree.rechecking.case import strengths
 from fuzzytree.rechecking.models import Model
 from fuzzytree.testing import random_tree
+from tests.auditing.decide.bases import random_base as mixed_base
 from tests.auditing.engine.bases import Kind, random_base, with_hidden_rule
 from tests.rechecking.audits import grip
 
@@ -179,7 +180,7 @@ def test_what_a_solver_refutes_is_left_out_and_an_error(
 
         return Results("z3 0", ["sat"] * len(_[1]))  # type: ignore[arg-type]
 
-    monkeypatch.setattr("fuzzytree.rechecking.ask", other)
+    monkeypatch.setattr("fuzzytree.rechecking.checks.ask", other)
     result, _ = audited(with_hidden_rule(random_base(1, 2, 2, kind="points")))
     codes = {one.code: one for one in result.answers}
     assert codes["FT901"].severity == "error"
@@ -228,7 +229,7 @@ def test_without_a_solver_proofs_stay_and_are_counted(
     ("text", "what"),
     [
         ("import sys; sys.stdin.read(); print('perhaps')", "it fails: 'perhaps'"),
-        ("import sys; sys.stdin.read(); print('unsat')", "1 answers to 9 claims"),
+        ("import sys; sys.stdin.read(); print('unsat')", "1 answers to 11 claims"),
         ("raise SystemExit(3)", "it fails: 'exit 3'"),
     ],
 )
@@ -266,6 +267,23 @@ def test_the_claims_of_an_audit_are_a_text_for_any_solver() -> None:
     context = z3.Context()
     answers = z3.Z3_eval_smtlib2_string(context.ref(), text).split()
     assert {*answers} == {"unsat"}
+
+
+@pytest.mark.parametrize("name", ["grip.yaml", "tipper.fll", "scorecard.fll"])
+def test_each_example_is_written_for_solvers(name: str) -> None:
+    model = ft.read(EXAMPLES / name).model
+    result = audit(Material(model), selection=AuditSelection(select=["FT404"]))
+    assert "(set-logic QF_" in smt_text(result, model)
+
+
+@pytest.mark.parametrize("kind", ["steps", "curves", "categories"])
+@pytest.mark.parametrize("norm", ["minimum", "product"])
+def test_each_random_base_is_written_for_solvers(norm: Any, kind: Any) -> None:
+    for seed in range(1 if kind == "curves" else 6):
+        model, domain = mixed_base(seed, kind, norm, sums=seed % 2)
+        only = AuditSelection(select=["FT404"])
+        result = audit(Material(model), domain=domain, selection=only)
+        assert f"; base {seed}: " in smt_text(result, model)
 
 
 def test_values_names_and_missing_are_asserted() -> None:

@@ -46,7 +46,7 @@ from fuzzytree.model import (
     name_choice,
     version,
 )
-from fuzzytree.rechecking import Confirmation, confirm_difference
+from fuzzytree.rechecking import Report, recheck_difference
 from fuzzytree.semantics import as_rules, rules_from_tree
 
 
@@ -190,15 +190,16 @@ def difference(
         tuple(sorted(changes, key=lambda change: order[change.grade])),
         tuple(map(words.answer, answers)),
     )
-    return _proved_twice(result, both)
+    return _confirmed(result, both)
 
 
-def _proved_twice(result: Difference, models: tuple[Document, Document]) -> Difference:
-    """Return a comparison in which PROVED is only what the re-checker decides too."""
+def _confirmed(result: Difference, models: tuple[Document, Document]) -> Difference:
+    """Return a comparison whose PROVED answers a solver confirms, if one is at hand."""
 
-    def confirmation() -> Confirmation:
+    def confirmation() -> Report:
         old, new = (find_format("yaml").write(model).content for model in models)
-        return confirm_difference(result.to_json().encode(), old, new)
+        names = "the comparison", "old.yaml", "new.yaml"
+        return recheck_difference(result.to_json().encode(), old, new, names)
 
     answers = with_confirmations(result.answers, confirmation)
     return msgspec.structs.replace(result, answers=answers)

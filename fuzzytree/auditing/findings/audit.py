@@ -55,7 +55,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.rechecking import (
     CannotRunError,
-    Confirmation,
+    Report,
     claims_text,
     confirm,
 )
@@ -155,7 +155,7 @@ def audit(
 def _confirmed(result: Audit, model: Document) -> Audit:
     """Return an audit whose PROVED answers a solver confirms, if one is at hand."""
 
-    def confirmation() -> Confirmation:
+    def confirmation() -> Report:
         return confirm(*_for_solver(result, model))
 
     answers = with_confirmations(result.answers, confirmation)
@@ -191,22 +191,24 @@ def _for_solver(result: Audit, model: Document) -> tuple[bytes, bytes]:
 
 
 def with_confirmations(
-    answers: Sequence[AuditAnswer], confirmation: Callable[[], Confirmation]
+    answers: Sequence[AuditAnswer], confirmation: Callable[[], Report]
 ) -> tuple[AuditAnswer, ...]:
     """Return answers with what confirms each.
 
     What it refutes is left out, and FT901 stands in its place.
     """
     try:
-        confirmed, refuted = confirmation()
+        report = confirmation()
     except (LossError, CannotRunError):
         return (*answers,)
     result = [*answers]
     for place, one in enumerate(answers):
-        if isinstance(one.state, Proved) and place in confirmed:
-            state = msgspec.structs.replace(one.state, confirmed=confirmed[place])
+        if isinstance(one.state, Proved) and place in report.confirmed:
+            state = msgspec.structs.replace(
+                one.state, confirmed=report.confirmed[place]
+            )
             result[place] = msgspec.structs.replace(one, state=state)
-    for place, why in refuted.items():
+    for place, why in report.refuted.items():
         if isinstance(answers[place].state, Proved):
             result[place] = _refuted(answers[place], why)
     return tuple(sorted(result, key=lambda one: one.code))
