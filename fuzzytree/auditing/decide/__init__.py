@@ -12,6 +12,7 @@ from fuzzytree.auditing.decide.answers import (
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.boxes import Boxes, search_boxes
 from fuzzytree.auditing.decide.decider import Decider, decide
+from fuzzytree.auditing.decide.outputs import NotBoundedError, OutputBounds, scale_of
 from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, Literal
 
 __all__ = [
@@ -23,11 +24,14 @@ __all__ = [
     "Decider",
     "LeftOut",
     "Literal",
+    "NotBoundedError",
     "Open",
     "OutOfStepsError",
+    "OutputBounds",
     "Point",
     "Proved",
     "Question",
     "decide",
+    "scale_of",
     "search_boxes",
 ]

@@ -8,9 +8,9 @@ extremes over runs of knots.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from functools import cached_property
 from typing import Literal as Choice
 
 import numpy as np
@@ -26,16 +26,20 @@ from fuzzytree.auditing.decide.answers import (
 )
 from fuzzytree.auditing.decide.axes import Axis, value_at
 from fuzzytree.auditing.decide.base import Base
-from fuzzytree.auditing.decide.lines import Lines
+from fuzzytree.auditing.decide.lines import Between, Lines
 from fuzzytree.auditing.decide.rules import Literal
-from fuzzytree.model import BoolArray, FloatArray
+from fuzzytree.model import BoolArray, FloatArray, IntArray
+from fuzzytree.numerics import outwards
+from fuzzytree.semantics import jet
 
 Side = Choice[0, 1]
+_Pick = Callable[[FloatArray, FloatArray], FloatArray]
 Factor = tuple[str, Literal]
 
 _SMALL = 2e-3  # of a piece between two knots: no box is halved further
 _MOST_SLIVERS = 500
 _LOOKS = 8  # boxes of each round whose middle is tried
+_JUMP = 2.0**-50  # a degree at a plateau's end is this near to that of its flank
 _ROUND = 1e-13  # more than a sum or product of a few doubles is rounded by
 
 
@@ -55,6 +59,7 @@ class Stretches:
         }
         self._tables: dict[tuple[int, bool], FloatArray] = {}
         self._are_doubles: dict[Literal, bool] = {}
+        self._slopes: dict[Literal, tuple[FloatArray, FloatArray]] = {}
 
     def _floats(self, lines: Lines) -> tuple[FloatArray, FloatArray, FloatArray]:
         start = lines.x.index(self.x[0])
@@ -124,58 +129,45 @@ class Stretches:
         u = np.floor(low).astype(int) + 1
         v = np.ceil(high).astype(int) - 1
         inside = v >= u
-        count = np.where(inside, v - u + 1, 1)
-        level = np.log2(count).astype(int)
-        table = self._table(part, is_most=is_most)
-        u = np.where(inside, u, 0)
-        back = np.where(inside, v - 2**level + 1, 0)
-        extreme = pick(table[level, u], table[level, back])
-        result = np.where(inside, pick(result, extreme), result)
-        return result
-
-    def _table(
-        self, part: tuple[FloatArray, FloatArray, FloatArray], *, is_most: bool
-    ) -> FloatArray:
-        """Return extremes over 2**k knots from each on, with their limits."""
+        u, v = np.where(inside, u, 0), np.where(inside, v, 0)
         key = id(part), is_most
         if key not in self._tables:
-            at, after, before = part
-            pick = np.maximum if is_most else np.minimum
             row = at.copy()
             row[:-1] = pick(row[:-1], after)
             row[1:] = pick(row[1:], before)
-            rows = [row]
-            while 2 ** len(rows) <= len(at):
-                step = 2 ** (len(rows) - 1)
-                last = rows[-1]
-                rows.append(
-                    np.concatenate([pick(last[:-step], last[step:]), last[-step:]])
-                )
-            self._tables[key] = np.array(rows)
-        return self._tables[key]
-
-    @cached_property
-    def widths(self) -> FloatArray:
-        """How far it is from each knot to the next."""
-        return np.diff(np.array([float(x) for x in self.x]))
+            self._tables[key] = _runs(row, pick)
+        extreme = _picked(self._tables[key], u, v, pick)
+        return np.where(inside, pick(result, extreme), result)
 
     def slope(
         self, literal: Literal, low: FloatArray, high: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of the slope of an exact literal; infinite at a jump."""
-        at, after, before = self.sides[literal][0]
-        slopes = (before - after) / self.widths
-        jumps = np.zeros((2, self.last + 1))
-        for side, pick in ((0, np.minimum), (1, np.maximum)):
-            jumps[side, :-1] = pick(after - at[:-1], 0.0)
-            jumps[side, 1:] = pick(jumps[side, 1:], pick(at[1:] - before, 0.0))
-        endless = np.where(np.abs(jumps) > 1e-15, np.sign(jumps) * np.inf, 0.0)
-        least, most = np.empty_like(low), np.empty_like(low)
-        first, last = np.floor(low).astype(int), np.ceil(high).astype(int)
-        for n, (u, v) in enumerate(zip(first, last, strict=True)):
-            inner = slopes[u : max(v, u + 1)]
-            least[n] = min(inner.min(), endless[0, u : v + 1].min())
-            most[n] = max(inner.max(), endless[1, u : v + 1].max())
+        """Return bounds of the slope of a literal on stretches; infinite at a jump."""
+        if literal not in self._slopes:
+            least, most = self._steps(literal)
+            self._slopes[literal] = _runs(least, np.minimum), _runs(most, np.maximum)
+        first, last = (
+            (np.floor(end) + np.ceil(end)).astype(int) for end in (low, high)
+        )
+        least, most = self._slopes[literal]
+        return (
+            _picked(least, first, last, np.minimum),
+            _picked(most, first, last, np.maximum),
+        )
+
+    def _steps(self, literal: Literal) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of slopes at knots, in even places, and between them."""
+        least = np.full(2 * self.last + 1, np.inf)
+        most = -least
+        both = self.axis.bounds[literal]
+        start = both.lower.x.index(self.x[0])
+        for n in range(self.last):
+            least[2 * n + 1], most[2 * n + 1] = _slope(both, literal, start + n)
+        (at, after, before), (at_most, after_most, before_most) = self.sides[literal]
+        most[2::2][at[1:] - before_most > _JUMP] = np.inf
+        most[:-1:2][after - at_most[:-1] > _JUMP] = np.inf
+        least[2::2][before - at_most[1:] > _JUMP] = -np.inf
+        least[:-1:2][at[:-1] - after_most > _JUMP] = -np.inf
         return least, most
 
     def value(self, position: float) -> Fraction:
@@ -189,6 +181,35 @@ class Stretches:
             Fraction(position) - piece
         )
         return Fraction(round(x)) if self.axis.is_whole else x
+
+
+def _runs(row: FloatArray, pick: _Pick) -> FloatArray:
+    """Return extremes over 2**k neighbours from each on, by k."""
+    rows = [row]
+    while 2 ** len(rows) <= len(row):
+        step, last = 2 ** (len(rows) - 1), rows[-1]
+        rows.append(np.concatenate([pick(last[:-step], last[step:]), last[-step:]]))
+    return np.array(rows)
+
+
+def _picked(
+    runs: FloatArray, first: IntArray, last: IntArray, pick: _Pick
+) -> FloatArray:
+    """Return extremes from each first to each last neighbour."""
+    k = np.log2(last - first + 1).astype(int)
+    return pick(runs[k, first], runs[k, last - 2**k + 1])
+
+
+def _slope(both: Between, literal: Literal, place: int) -> tuple[float, float]:
+    """Return bounds of the slope of a literal between two knots."""
+    lower, (a, b) = both.lower, both.lower.x[place : place + 2]
+    if both.is_exact:
+        return outwards((lower.before[place] - lower.after[place]) / (b - a))
+    ends = outwards(a)[0], outwards(b)[1]
+    slopes = [jet(function, *ends).slope for function in literal.functions]
+    scale = float(-literal.scale if literal.negated else literal.scale)
+    every = [scale * end for slope in slopes for end in (slope.low, slope.high)]
+    return math.nextafter(min(every), -math.inf), math.nextafter(max(every), math.inf)
 
 
 class Boxes:
@@ -222,11 +243,21 @@ class Boxes:
         return self._degrees[key]
 
     def slope(self, name: str, literal: Literal) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of the slope of an exact literal on each box."""
+        """Return bounds of the slope of a literal with its axis on each box."""
         place = self.places[name]
         return self.stretches[name].slope(
             literal, self.low[:, place], self.high[:, place]
         )
+
+    def value(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of an input on each box."""
+        if name not in self.places:
+            axis, ones = self.base.inputs[name], np.ones(len(self.low))
+            return ones * float(axis.least), ones * float(axis.largest)
+        place, xs = self.places[name], [float(x) for x in self.stretches[name].x]
+        knots = range(len(xs))
+        low = np.interp(self.low[:, place], knots, xs)
+        return low, np.interp(self.high[:, place], knots, xs)
 
     def strength(
         self, rule: int, side: Side, without: frozenset[Factor] = frozenset()

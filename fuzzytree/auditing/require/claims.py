@@ -1,7 +1,8 @@
-"""What requirements claim of a model, and the record of what was found."""
+"""What requirements claim of a model, and the record of how it turns out."""
 
 from __future__ import annotations
 
+import math
 from typing import Final, Literal, NamedTuple
 
 import msgspec
@@ -38,26 +39,16 @@ class CoveredClaim(NamedTuple):
     """Every output of a system has a number that rules conclude."""
 
 
-class LevelClaim(NamedTuple):
-    """An output lies between two numbers; either may be None."""
+class NumberClaim(NamedTuple):
+    """An output, or its change per unit of an input, lies between two numbers."""
 
     output: str
-    low: float | None
-    high: float | None
+    low: float = -math.inf
+    high: float = math.inf
+    input: str = ""
 
 
-class SlopeClaim(NamedTuple):
-    """An output changes, per unit of an input, by a number between two."""
-
-    output: str
-    input: str
-    low: float | None
-    high: float | None
-
-
-Claim = (
-    ClassClaim | OrderClaim | UnchangedClaim | CoveredClaim | LevelClaim | SlopeClaim
-)
+Claim = ClassClaim | OrderClaim | UnchangedClaim | CoveredClaim | NumberClaim
 
 
 class Requirement(NamedTuple):

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 
 import numpy as np
 
-from fuzzytree.auditing.decide import Answer, Open, Point, Proved, Question
+from fuzzytree.auditing.decide import Question
 from fuzzytree.auditing.require.claims import OrderClaim
 from fuzzytree.auditing.require.leaves import pair_of_rows
-from fuzzytree.auditing.require.search import Outcome, Rows, Search, prediction_texts
-from fuzzytree.model import BoolArray, FloatArray, FuzzySystem, FuzzyTree, Linear
-
-_PAIRS = 1024  # of rows that differ in some inputs only
+from fuzzytree.auditing.require.search import Outcome, Rows, Search
+from fuzzytree.auditing.require.tables import prediction_texts
+from fuzzytree.model import FloatArray, FuzzySystem, FuzzyTree, Linear
 
 
 def class_outcome(search: Search, labels: Sequence[str | None]) -> Outcome:
@@ -24,34 +24,31 @@ def class_outcome(search: Search, labels: Sequence[str | None]) -> Outcome:
     model, rules = search.model, search.base.rules
     assert not isinstance(model, FuzzySystem)
     right = [k for k, rule in enumerate(rules) if rule.then in labels]
-    answers: list[Answer] = []
-    for k, rule in enumerate(rules):
-        if rule.then not in labels:
-            rivals = tuple(j for j in right if j < k)
-            weak = tuple(j for j in right if j > k)
-            answers.append(search.ask(Question((k,), rivals, weak)))
+    questions = [
+        Question(
+            (k,), tuple(j for j in right if j < k), tuple(j for j in right if j > k)
+        )
+        for k, rule in enumerate(rules)
+        if rule.then not in labels
+    ]
     if not isinstance(model, FuzzyTree) and model.semantics.uncovered not in labels:
-        answers.append(search.ask_gap(range(len(rules))))
+        questions.append(gap(range(len(rules))))
+    allowed = [k for k, one in enumerate((*model.classes, None)) if one in labels]
 
-    def loss(row: Rows) -> float:
-        code = int(search.predict(row)[0, 0])
-        return 1.0 if (*model.classes, None)[code] not in labels else -1.0
+    def loss(rows: Rows) -> FloatArray:
+        return np.where(np.isin(search.predict(rows)[0, 0], allowed), -1.0, 1.0)
 
-    for answer in answers:
-        if isinstance(answer, Point):
-            row = search.row(answer.values)
-            if loss(row) > 0.0:
-                row = search.short(row, loss)
-                (label,) = prediction_texts(model, row)
-                return Outcome("REFUTED", f"the prediction is {label}", row)
-    rest = [answer for answer in answers if not isinstance(answer, Proved)]
-    if rest:
-        return Outcome("OPEN", f"{len(rest)} of {len(answers)}: {_why(rest[0])}")
-    return Outcome("PROVED", f"no other rule decides, of {len(answers)}")
+    proof = f"no other rule decides, of {len(questions)}"
+    outcome = search.rule_out(questions, "another rule decides", proof, loss)
+    if outcome.rows is None:
+        return outcome
+    (label,) = prediction_texts(model, outcome.rows)
+    return outcome._replace(sentence=f"the prediction is {label}")
 
 
-def _why(answer: Answer) -> str:
-    return answer.why if isinstance(answer, Open) else "no double shows a point"
+def gap(rules: Sequence[int]) -> Question:
+    """Return the question whether there is a point at which no rule fires."""
+    return Question(weak=tuple(rules), level=Fraction(0))
 
 
 def order_outcome(search: Search, claim: OrderClaim) -> Outcome:
@@ -60,10 +57,11 @@ def order_outcome(search: Search, claim: OrderClaim) -> Outcome:
     assert not isinstance(model, FuzzySystem)
     ranks = np.array([*map(labels.index, model.classes), np.nan])
 
-    def rank(rows: Rows) -> FloatArray:
-        return np.array(ranks[search.predict(rows)[0].astype(int)])
+    def loss(rows: Rows) -> FloatArray:
+        first, second = ranks[search.predict(rows)[0].astype(int)]
+        return np.where(first > second, first - second, -1.0)
 
-    rows = search.fall(claim.input, rank, 0.5)
+    rows = search.worst(loss, [claim.input])
     if rows is not None:
         return Outcome("REFUTED", "an earlier class follows", rows)
     if isinstance(model, FuzzyTree):
@@ -87,31 +85,26 @@ def unchanged_outcome(
         allowed: By how much each result may differ.
     """
     model, rules, axes = search.model, search.base.rules, search.base.axes
-    places = [model.inputs.index(name) for name in columns]
-    first, other = search.draw(_PAIRS), search.draw(_PAIRS)
-    second = first.copy()
-    second[places] = other[places]
 
-    def differ(one: Rows, two: Rows) -> BoolArray:
-        a, b = search.predict(one), search.predict(two)
-        far = np.abs(a - b) > allowed[:, None]
-        return np.array((far | (np.isnan(a) != np.isnan(b))).any(0))
+    def loss(rows: Rows) -> FloatArray:
+        first, second = np.moveaxis(search.predict(rows), 1, 0)
+        is_far = np.abs(first - second) > allowed[:, None]
+        is_far |= np.isnan(first) != np.isnan(second)
+        return np.where(is_far.any(0), 1.0, -1.0)
 
-    for k in np.flatnonzero(differ(first, second))[:1]:
-        rows = np.stack([first[:, k], second[:, k]], axis=1)
-        rows = search.short(rows, lambda two: float(differ(two[:, :1], two[:, 1:])[0]))
-        return Outcome("REFUTED", "the rows differ in nothing else", rows)
+    pair = search.worst(loss, columns) if columns else None
+    if pair is not None:
+        return Outcome("REFUTED", "the rows differ in nothing else", pair)
     if isinstance(model, FuzzyTree):
         return _of_leaves(search, columns, lambda one, two: one != two, rises=False)
-    for variable in model.outputs if isinstance(model, FuzzySystem) else ():
-        for term in variable.terms:
-            weights = (
-                term.function.weights if isinstance(term.function, Linear) else None
-            )
+    rest: set[int] = {*range(len(rules))}
+    if isinstance(model, FuzzySystem):
+        rest.clear()
+        places = [model.inputs.index(name) for name in columns]
+        for term in (term for output in model.outputs for term in output.terms):
+            weights = isinstance(term.function, Linear) and term.function.weights
             if weights and any(weights[place] for place in places):
-                return Outcome(
-                    "OPEN", f"the term {term.name!r} of {variable.name!r} adds it"
-                )
+                return Outcome("OPEN", f"the term {term.name!r} adds it")
     if search.base.left_out:
         return Outcome("OPEN", f"{search.base.left_out[0].name} is not bounded")
     tests = [
@@ -119,11 +112,12 @@ def unchanged_outcome(
         for k, rule in enumerate(rules)
         if any({*axes[name].weights} & {*columns} for name, _ in rule.literals)
     ]
-    rest = () if isinstance(model, FuzzySystem) else {*range(len(rules))} - {*tests}
-    for k in tests:
-        if not isinstance(search.ask(Question((k,), weak=tuple(rest))), Proved):
-            return Outcome("OPEN", f"rule {rules[k].number} tests it and may decide")
-    return Outcome("PROVED", f"no rule that tests it decides, of {len(tests)}")
+    weak = tuple(rest - {*tests})
+    return search.rule_out(
+        [Question((k,), weak=weak) for k in tests],
+        "a rule that tests it decides",
+        f"no rule that tests it decides, of {len(tests)}",
+    )
 
 
 def _of_leaves(
@@ -136,11 +130,11 @@ def _of_leaves(
     """Return whether the classes of no two leaves of a tree are wrong together."""
     tree = search.model
     assert isinstance(tree, FuzzyTree)
-    tested = {node.variable for node in tree.nodes}
+    tests = {node.variable for node in tree.nodes}
     for variable in tree.variables:
-        summed = {part.input for part in variable.parts} & {*columns}
-        if summed and variable.name in tested:
-            return Outcome("OPEN", f"{variable.name!r} is a sum with {min(summed)!r}")
+        sums = {part.input for part in variable.parts} & {*columns}
+        if sums and variable.name in tests:
+            return Outcome("OPEN", f"{variable.name!r} is a sum with {min(sums)!r}")
     rows = pair_of_rows(tree, search.domain, columns, is_wrong, rises=rises)
     if rows is None:
         return Outcome("PROVED", f"no two of {len(tree.leaves)} leaves contradict it")

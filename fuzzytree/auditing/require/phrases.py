@@ -16,10 +16,9 @@ from fuzzytree.auditing.require.claims import (
     Claim,
     ClassClaim,
     CoveredClaim,
-    LevelClaim,
+    NumberClaim,
     OrderClaim,
     Requirement,
-    SlopeClaim,
     UnchangedClaim,
 )
 from fuzzytree.cells import number_of
@@ -32,40 +31,34 @@ _CONDITION = re.compile(
     r"|\s+is\s+between\s+(?P<low>.+?)\s+and\s+(?P<high>.+?)"
     r"|(?:\s+is\s+|\s*=\s*)(?P<values>.+?))\s*(?:\s+and\s+|$)"
 )
-_SHARED = (
-    (r"every input gets an? (class|output)", "every input gets a class (an output)"),
-    (r"changing (?P<columns>.+) changes nothing", "changing INPUT changes nothing"),
-)
-_OF_CLASSES: Final = (
-    (
-        r"class (?P<way>rises|falls) with (?P<input>.+) in the order (?P<labels>.+)",
-        "class rises (falls) with INPUT in the order CLASS, CLASS",
+_OF_BOTH: Final = {
+    r"every input gets an? (class|output)": "every input gets a class (an output)",
+    r"changing (?P<columns>.+) changes nothing": "changing INPUT changes nothing",
+}
+_OF_CLASSES: Final = {
+    r"class (?P<way>rises|falls) with (?P<input>.+) in the order (?P<labels>.+)": (
+        "class rises (falls) with INPUT in the order CLASS, CLASS"
     ),
-    (
-        r"class is (?P<how>never|always) (?P<labels>.+)",
-        "class is never (always) CLASS or CLASS",
+    r"class is (?P<how>never|always) (?P<labels>.+)": (
+        "class is never (always) CLASS or CLASS"
     ),
-    *_SHARED,
-)
-_OF_OUTPUTS: Final = (
-    (
-        r"(?P<output>.+) is at (?P<side>least|most) (?P<end>\S+)",
-        "OUTPUT is at least (at most) NUMBER",
+} | _OF_BOTH
+_OF_OUTPUTS: Final = {
+    r"(?P<output>.+) is at (?P<way>least|most) (?P<end>\S+)": (
+        "OUTPUT is at least (at most) NUMBER"
     ),
-    (
-        r"(?P<output>.+) is between (?P<low>\S+) and (?P<high>\S+)",
-        "OUTPUT is between NUMBER and NUMBER",
+    r"(?P<output>.+) is between (?P<low>\S+) and (?P<high>\S+)": (
+        "OUTPUT is between NUMBER and NUMBER"
     ),
-    (
-        r"(?P<output>.+) (?P<way>rises|falls) with (?P<input>.+)",
-        "OUTPUT rises (falls) with INPUT",
+    r"(?P<output>.+) (?P<way>rises|falls) with (?P<input>.+)": (
+        "OUTPUT rises (falls) with INPUT"
     ),
-    (
-        r"(?P<output>.+) changes by at most (?P<end>\S+) per (?P<input>.+)",
-        "OUTPUT changes by at most NUMBER per INPUT",
+    r"(?P<output>.+) changes by at most (?P<slope>\S+) per (?P<input>.+)": (
+        "OUTPUT changes by at most NUMBER per INPUT"
     ),
-    *_SHARED,
-)
+} | _OF_BOTH
+"""What sentences look like, and how messages show it."""
+
 _Spans = tuple[tuple[float, float], ...]
 _ALL: Final[_Spans] = ((-math.inf, math.inf),)
 
@@ -89,26 +82,26 @@ def parse_requirement(text: str, model: Document, where: str = "") -> Requiremen
         >>> parse_requirement(text, system).claim.low
         2.0
     """
-    claim, _, condition = text.strip().partition(" where ")
+    sentence, _, condition = text.strip().partition(" where ")
     premise = ""
-    if implication := re.fullmatch(r"if (.+?) then (.+)", claim):
-        premise, claim = implication.groups()
+    if implication := re.fullmatch(r"if (.+?) then (.+)", sentence):
+        premise, sentence = implication.groups()
     spans: dict[str, _Spans] = {}
     for part in (premise, condition, where):
         _add_conditions(part, spans, model)
-    result = _claim(claim.strip(), model)
-    changing: tuple[str, ...] = getattr(result, "columns", ())
-    for name in (*changing, getattr(result, "input", "")):
+    claim = _claim(sentence.strip(), model)
+    changes: tuple[str, ...] = getattr(claim, "columns", ())
+    for name in (*changes, getattr(claim, "input", "")):
         (low, high), *more = spans.get(name, _ALL)
         if low == high and not more:
             raise ValueError(f"the conditions fix {name!r}, which has to change")
     if math.prod(map(len, spans.values())) > _MOST_BOXES:
         raise ValueError(f"the conditions combine to more than {_MOST_BOXES} cases")
-    boxes = (
-        dict(zip(spans, box, strict=True)) for box in itertools.product(*spans.values())
-    )
+    boxes = itertools.product(*spans.values())
     whole = f"{text.strip()} where {where.strip()}" if where else text.strip()
-    return Requirement(whole, result, tuple(boxes))
+    return Requirement(
+        whole, claim, tuple(dict(zip(spans, box, strict=True)) for box in boxes)
+    )
 
 
 # --- conditions
@@ -129,8 +122,8 @@ def _add_conditions(text: str, spans: dict[str, _Spans], model: Document) -> Non
                 "NAME >= 1, NAME is A or B and NAME is between 1 and 2, joined by 'and'"
             )
         position = match.end()
-        name = _plain(match["name"])
-        variable = _input(name, model)
+        variable = _input(match["name"], model)
+        name = variable.name
         pairs = itertools.product(spans.get(name, _ALL), _condition(match, variable))
         left = [(max(a, c), min(b, d)) for (a, b), (c, d) in pairs]
         spans[name] = tuple((low, high) for low, high in left if low <= high)
@@ -150,18 +143,27 @@ def _condition(match: re.Match[str], variable: Variable) -> _Spans:
         )
     if match["sign"] is None:
         low, high = (read_value(variable, match[end]) for end in ("low", "high"))
-        if low > high:
-            raise ValueError(_swapped(match))
-        return ((low, high),)
-    end, sign = read_value(variable, match["end"]), match["sign"]
-    if sign[0] == "<":
-        return ((-math.inf, end if sign == "<=" else math.nextafter(end, -math.inf)),)
-    return ((end if sign == ">=" else math.nextafter(end, math.inf), math.inf),)
+        return (_ordered(low, high, match),)
+    end = read_value(variable, match["end"])
+    match match["sign"]:
+        case "<":
+            return ((-math.inf, math.nextafter(end, -math.inf)),)
+        case "<=":
+            return ((-math.inf, end),)
+        case ">":
+            return ((math.nextafter(end, math.inf), math.inf),)
+        case _:
+            return ((end, math.inf),)
 
 
-def _swapped(match: re.Match[str]) -> str:
-    ends = f"the ends {match['low']} and {match['high']} are swapped"
-    return f"{ends}; the smaller one stands first"
+def _ordered(low: float, high: float, match: re.Match[str]) -> tuple[float, float]:
+    if low > high:
+        ends = f"the ends {match['low']} and {match['high']} are swapped"
+        raise ValueError(f"{ends}; the smaller one stands first")
+    return low, high
+
+
+# --- names and numbers
 
 
 def _number(text: str) -> float:
@@ -171,8 +173,8 @@ def _number(text: str) -> float:
     return value
 
 
-def _names(text: str) -> list[str]:
-    return [_plain(name) for name in re.split(r",|\bor\b", text) if name.strip()]
+def _names(text: str, joints: str = r",|\bor\b") -> list[str]:
+    return [_plain(name) for name in re.split(joints, text) if name.strip()]
 
 
 def _plain(text: str) -> str:
@@ -181,15 +183,16 @@ def _plain(text: str) -> str:
     return text[1:-1] if is_quoted else text
 
 
-def _choose(name: str, noun: str, names: Collection[str]) -> None:
+def _choice(text: str, noun: str, names: Collection[str]) -> str:
+    name = _plain(text)
     if name not in names:
         raise ValueError(f"there is no {noun} {name!r}; {name_choice(name, names)}")
+    return name
 
 
-def _input(name: str, model: Document) -> Variable:
+def _input(text: str, model: Document) -> Variable:
     inputs = {one.name: one for one in model.variables if not one.parts}
-    _choose(name, "input", inputs)
-    return inputs[name]
+    return inputs[_choice(text, "input", inputs)]
 
 
 # --- claims
@@ -197,69 +200,54 @@ def _input(name: str, model: Document) -> Variable:
 
 def _claim(text: str, model: Document) -> Claim:
     forms = _OF_OUTPUTS if isinstance(model, FuzzySystem) else _OF_CLASSES
-    for pattern, _ in forms:
-        if match := re.fullmatch(pattern, text):
-            words = {name: _plain(part) for name, part in match.groupdict().items()}
-            if isinstance(model, FuzzySystem):
-                return _output_claim(match, words, model)
-            return _class_claim(words, model.classes, model)
-    shown = "; ".join(form for _, form in forms)
-    raise ValueError(f"{text!r} is no requirement of this model; there is {shown}")
+    matches = (re.fullmatch(pattern, text) for pattern in forms)
+    match = next((match for match in matches if match), None)
+    if match is None:
+        shown = "; ".join(forms.values())
+        raise ValueError(f"{text!r} is no requirement of this model; there is {shown}")
+    if columns := match.groupdict().get("columns"):  # some are no inputs
+        every = sorted({*model.inputs, *getattr(model, "columns", ())})
+        names = _names(columns, r",|\bor\b|\band\b")
+        chosen = [_choice(name, "column", every) for name in names]
+        return UnchangedClaim(tuple(name for name in chosen if name in model.inputs))
+    if isinstance(model, FuzzySystem):
+        return _output_claim(match, model)
+    return _class_claim(match, model.classes, model)
 
 
 def _class_claim(
-    words: dict[str, str], classes: tuple[str, ...], model: Document
+    match: re.Match[str], classes: tuple[str, ...], model: Document
 ) -> Claim:
-    if "columns" in words:
-        return _unchanged(words, model)
-    labels = _names(words.get("labels", "")) or [*classes]
-    for label in labels:
-        _choose(label, "class", classes)
+    words = match.groupdict()
+    if not words:
+        return ClassClaim(classes)
+    labels = tuple(_choice(name, "class", classes) for name in _names(words["labels"]))
     if "way" in words:
         if sorted(labels) != sorted(classes):
             raise ValueError(f"the order must name once each of {', '.join(classes)}")
-        order = tuple(labels if words["way"] == "rises" else labels[::-1])
+        order = labels if words["way"] == "rises" else labels[::-1]
         return OrderClaim(_input(words["input"], model).name, order)
-    if words.get("how") == "never":
-        return ClassClaim((None, *(one for one in classes if one not in labels)))
-    return ClassClaim(tuple(labels))
+    if words["how"] == "never":
+        return ClassClaim((None, *(name for name in classes if name not in labels)))
+    return ClassClaim(labels)
 
 
-def _output_claim(
-    match: re.Match[str], words: dict[str, str], system: FuzzySystem
-) -> Claim:
-    if "columns" in words:
-        return _unchanged(words, system)
-    if "output" not in words:
+def _output_claim(match: re.Match[str], system: FuzzySystem) -> Claim:
+    words = match.groupdict()
+    if not words:
         return CoveredClaim()
-    output = words["output"]
-    _choose(output, "output", [one.name for one in system.outputs])
-    ends = {
-        name: _number(words[name]) for name in ("low", "high", "end") if name in words
-    }
-    if "low" in ends and ends["low"] > ends["high"]:
-        raise ValueError(_swapped(match))
-    if "low" in ends:
-        return LevelClaim(output, ends["low"], ends["high"])
-    if "side" in words:
-        is_low = words["side"] == "least"
-        return LevelClaim(
-            output, *((ends["end"], None) if is_low else (None, ends["end"]))
-        )
-    name = _input(words["input"], system).name
-    if "way" in words:
-        return SlopeClaim(
-            output, name, *((0.0, None) if words["way"] == "rises" else (None, 0.0))
-        )
-    if ends["end"] < 0.0:
-        raise ValueError(f"the largest change must be 0 or more, not {words['end']}")
-    return SlopeClaim(output, name, -ends["end"], ends["end"])
-
-
-def _unchanged(words: dict[str, str], model: Document) -> UnchangedClaim:
-    """Return the claim; no prediction depends on a column that is no input."""
-    names = re.split(r",|\bor\b|\band\b", words["columns"])
-    columns = sorted({*model.inputs, *getattr(model, "columns", ())})
-    for name in (chosen := [_plain(one) for one in names]):
-        _choose(name, "column", columns)
-    return UnchangedClaim(tuple(one for one in chosen if one in model.inputs))
+    output = _choice(words["output"], "output", [one.name for one in system.outputs])
+    name = _input(words["input"], system).name if "input" in words else ""
+    if "slope" in words:
+        slope = _number(words["slope"])
+        if slope < 0.0:
+            text = f"the largest change must be 0 or more, not {words['slope']}"
+            raise ValueError(text)
+        return NumberClaim(output, -slope, slope, name)
+    if "low" in words:
+        ends = _ordered(_number(words["low"]), _number(words["high"]), match)
+        return NumberClaim(output, *ends)
+    end = _number(words.get("end", "0"))
+    if words["way"] in ("least", "rises"):
+        return NumberClaim(output, low=end, input=name)
+    return NumberClaim(output, high=end, input=name)

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from msgspec.structs import replace
 
+from fuzzytree.auditing.decide import NotBoundedError, scale_of
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.require.claims import (
     Box,
@@ -16,11 +17,10 @@ from fuzzytree.auditing.require.claims import (
     ClassClaim,
     Compliance,
     CoveredClaim,
-    LevelClaim,
+    NumberClaim,
     OrderClaim,
     Requirement,
     RequirementAnswer,
-    SlopeClaim,
     UnchangedClaim,
 )
 from fuzzytree.auditing.require.classes import (
@@ -29,19 +29,13 @@ from fuzzytree.auditing.require.classes import (
     unchanged_outcome,
 )
 from fuzzytree.auditing.require.numbers import (
+    ROUNDING,
     covered_outcome,
-    level_outcome,
-    slope_outcome,
+    number_outcome,
 )
-from fuzzytree.auditing.require.outputs import ROUNDING, scale_of
-from fuzzytree.auditing.require.search import (
-    Outcome,
-    Search,
-    prediction_texts,
-    rows_text,
-)
-from fuzzytree.auditing.require.slopes import NotBoundedError
-from fuzzytree.model import Document, FuzzySystem, fingerprint, version
+from fuzzytree.auditing.require.search import Outcome, Search
+from fuzzytree.auditing.require.tables import prediction_texts, rows_text
+from fuzzytree.model import Document, FuzzySystem, Variable, fingerprint, version
 
 STEPS: Final = 4_000_000
 """The budget of each question of a requirement; a step is about a microsecond."""
@@ -71,34 +65,28 @@ def comply(
     """
     if steps < 1:
         raise ValueError(f"the budget must be 1 step or more, not {steps}")
-    parts = [
-        [_part(model, domain, one, box) for box in one.boxes] for one in requirements
+    boxes = [
+        [_part(model, domain, each, box) for box in each.boxes] for each in requirements
     ]
-    return Compliance(
-        version(),
-        title or model.name,
-        fingerprint(model),
-        source,
-        steps,
-        tuple(
-            _answer(model, requirement, boxes, steps)
-            for requirement, boxes in zip(requirements, parts, strict=True)
-        ),
+    answers = tuple(
+        _answer(model, each, parts, steps)
+        for each, parts in zip(requirements, boxes, strict=True)
     )
+    title = title or model.name
+    return Compliance(version(), title, fingerprint(model), source, steps, answers)
 
 
 def _answer(
     model: Document, requirement: Requirement, boxes: Sequence[Domain], steps: int
 ) -> RequirementAnswer:
     """Return what is known of a requirement, by its worst box."""
-    outcomes: list[Outcome] = []
+    worst = Outcome("PROVED", "")
     for box in boxes:
-        outcomes.append(_outcome(model, requirement.claim, box, steps))
-        if outcomes[-1].verdict == "REFUTED":
+        outcome = _outcome(model, requirement.claim, box, steps)
+        if worst.verdict == "PROVED" or outcome.verdict == "REFUTED":
+            worst = outcome
+        if worst.verdict == "REFUTED":
             break
-    worst = max(
-        outcomes, key=lambda one: ("PROVED", "OPEN", "REFUTED").index(one.verdict)
-    )
     rows = worst.rows
     return RequirementAnswer(
         requirement.text,
@@ -115,62 +103,68 @@ def _answer(
 
 
 def _outcome(model: Document, claim: Claim, domain: Domain, steps: int) -> Outcome:
-    if isinstance(claim, OrderClaim | SlopeClaim):  # a missing value has no place in it
-        sides = [
-            replace(side, missing=None) if side.variable == claim.input else side
+    if name := getattr(claim, "input", ""):  # a missing value has no place in it
+        sides = (
+            replace(side, missing=None) if side.variable == name else side
             for side in domain.sides
-        ]
+        )
         domain = Domain(tuple(sides))
     search = Search(model, domain, steps)
     try:
-        match claim:
-            case ClassClaim(labels=labels):
+        if isinstance(claim, UnchangedClaim):
+            allowed = [0.5]  # of the position of a class
+            if isinstance(model, FuzzySystem):
+                allowed = [ROUNDING * scale_of(model, o.name) for o in model.outputs]
+            return unchanged_outcome(search, claim.columns, np.array(allowed))
+        match claim, model:
+            case ClassClaim(labels=labels), _:
                 return class_outcome(search, labels)
-            case OrderClaim():
+            case OrderClaim(), _:
                 return order_outcome(search, claim)
-            case UnchangedClaim(columns=columns):
-                allowed = [0.5]  # of the position of a class
-                if isinstance(model, FuzzySystem):
-                    allowed = [ROUNDING * scale_of(model, one) for one in model.outputs]
-                return unchanged_outcome(search, columns, np.array(allowed))
-            case CoveredClaim():
-                return covered_outcome(search)
-            case LevelClaim():
-                return level_outcome(search, claim)
-            case SlopeClaim():
-                return slope_outcome(search, claim)
+            case CoveredClaim(), FuzzySystem():
+                return covered_outcome(search, model)
+            case NumberClaim(), FuzzySystem():
+                return number_outcome(search, model, claim)
+            case _:
+                raise TypeError(f"{claim} is a claim about a fuzzy system")
     except NotBoundedError as error:
         return Outcome("OPEN", str(error))
 
 
-def _part(
-    model: Document, domain: Domain, requirement: Requirement, box: Box
-) -> Domain:
+def _part(model: Document, domain: Domain, of: Requirement, box: Box) -> Domain:
     """Return the rows of a domain in a box, whose ends replace those of the domain.
 
     Raises:
         ValueError: If there is none.
     """
-    sides: list[DomainSide] = []
     columns = {variable.name: variable for variable in model.variables}
+    sides: list[DomainSide] = []
     for side in domain.sides:
-        if columns[side.variable].parts:
+        variable = columns[side.variable]
+        if variable.parts:
             raise ValueError(f"{side.variable!r} is a sum; limits are for its inputs")
-        if side.variable in box:
-            ends = f"{side.low:g} to {side.high:g}"
-            low, high = box[side.variable]
-            low = side.low if math.isinf(low) else low
-            high = side.high if math.isinf(high) else high
-            if columns[side.variable].clips:
-                low, high = max(low, side.low), min(high, side.high)
-            if side.is_whole:
-                low, high = math.ceil(low), math.floor(high)
-            values = tuple(value for value in side.values if low <= value <= high)
-            if low > high or (side.values and not values):
+        if ends := box.get(side.variable):
+            part = _narrowed(side, variable, *ends)
+            if part.low > part.high or (side.values and not part.values):
                 raise ValueError(
-                    f"{requirement.text!r}: no row meets the conditions, as the values "
-                    f"of {side.variable!r} are {ends}; --limits sets others"
+                    f"{of.text!r}: no row meets the conditions, as the values of "
+                    f"{side.variable!r} are {side.low:g} to {side.high:g}; "
+                    "--limits sets others"
                 )
-            side = replace(side, low=low, high=high, values=values, missing=None)
+            side = part
         sides.append(side)
     return Domain(tuple(sides))
+
+
+def _narrowed(
+    side: DomainSide, variable: Variable, low: float, high: float
+) -> DomainSide:
+    """Return the values of a side between two ends, which may lie beyond its own."""
+    if variable.clips or math.isinf(low):
+        low = max(low, side.low)
+    if variable.clips or math.isinf(high):
+        high = min(high, side.high)
+    if side.is_whole:
+        low, high = math.ceil(low), math.floor(high)
+    values = tuple(value for value in side.values if low <= value <= high)
+    return replace(side, low=low, high=high, values=values, missing=None)

@@ -9,10 +9,14 @@ import pytest
 from numpy.random import Generator
 
 import fuzzytree as ft
-from fuzzytree.auditing.decide import Base, Boxes, Budget, search_boxes
+from fuzzytree.auditing.decide import (
+    Base,
+    Boxes,
+    Budget,
+    OutputBounds,
+    search_boxes,
+)
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.require.outputs import OutputBounds
-from fuzzytree.auditing.require.slopes import Slopes
 from fuzzytree.model import (
     And,
     BoolArray,
@@ -177,7 +181,7 @@ def check_bounds(model: FuzzySystem, seed: int) -> int:
     """Compare the bounds on boxes with the model at rows in them; return how many."""
     chance = np.random.default_rng(seed)
     base = Base.of(model, domain_of(model)).fine
-    bounds, slopes = OutputBounds(base, model, "y"), Slopes(base, "x0")
+    bounds = OutputBounds(base, model, "y")
     seen = 0
 
     def is_excluded(boxes: Boxes) -> BoolArray:
@@ -186,7 +190,7 @@ def check_bounds(model: FuzzySystem, seed: int) -> int:
             number = bounds.numbers(boxes)
             slope = None
             if model.outputs[0].aggregation != "algebraic sum":
-                slope = bounds.slopes(boxes, slopes)
+                slope = bounds.slopes(boxes, "x0")
         for k in range(len(boxes.low)):
             first = {
                 name: stretch.value(chance.uniform(boxes.low[k, n], boxes.high[k, n]))

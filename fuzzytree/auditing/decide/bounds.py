@@ -79,7 +79,7 @@ def average(values: Bounds, weights: Bounds) -> Bounds:
 def _least_average(values: FloatArray, weights: Bounds) -> FloatArray:
     values = np.broadcast_to(values, weights.low.shape)
     order = np.argsort(values, axis=0, kind="stable")
-    x, low, high = (np.take_along_axis(one, order, 0) for one in (values, *weights))
+    x, low, high = (np.take_along_axis(each, order, 0) for each in (values, *weights))
     with np.errstate(divide="ignore", invalid="ignore"):
         sums = _parted(high, low)
         averages = np.where(sums > 0.0, _parted(x * high, x * low) / sums, np.inf)
@@ -94,19 +94,31 @@ def _parted(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.array(first.cumsum(0) + rest)
 
 
-def largest(
-    values: Sequence[Bounds], slopes: Sequence[Bounds]
-) -> tuple[Bounds, Bounds]:
-    """Return bounds of the largest of some numbers, and of its slope.
+class Change(NamedTuple):
+    """Bounds of a number, and of its slope with an input."""
+
+    value: Bounds
+    slope: Bounds
+
+    def __neg__(self) -> Change:
+        return Change(-self.value, -self.slope)
+
+    def times(self, other: Change) -> Change:
+        """Return the product."""
+        slope = self.slope.times(other.value).plus(self.value.times(other.slope))
+        return Change(self.value.times(other.value), slope)
+
+
+def largest(changes: Sequence[Change]) -> Change:
+    """Return the largest of some numbers.
 
     Its slope is that of a number that may be larger than all others, or of the one
     that is surely as large as the rest.
     """
-    (lows, highs), (falls, rises) = stacked(values), stacked(slopes)
-    low = lows.max(0)
-    may_be = highs > low
-    np.put_along_axis(may_be, lows.argmax(0)[None], values=True, axis=0)
-    slope = Bounds(
-        np.where(may_be, falls, np.inf).min(0), np.where(may_be, rises, -np.inf).max(0)
-    )
-    return Bounds(low, highs.max(0)), slope
+    values, slopes = (stacked(each) for each in zip(*changes, strict=True))
+    low = values.low.max(0)
+    may_be = values.high > low
+    np.put_along_axis(may_be, values.low.argmax(0)[None], values=True, axis=0)
+    falls = np.where(may_be, slopes.low, np.inf).min(0)
+    rises = np.where(may_be, slopes.high, -np.inf).max(0)
+    return Change(Bounds(low, values.high.max(0)), Bounds(falls, rises))
