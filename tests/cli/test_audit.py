@@ -48,8 +48,8 @@ def test_a_finding_is_reported_at_its_place_and_fails(call: Call) -> None:
         "  again    fuzzytree audit grip.yaml --limits force=3:5 --select FT101" in out
     )
     assert lines[0] == (
-        "1 finding: 1 error; 2 PROVED, 2 confirmed by recheck and z3; `fuzzytree "
-        "explain FT101` explains the"
+        "1 finding: 1 error; 2 PROVED, 2 confirmed by z3; `fuzzytree "
+        "explain FT101` explains the gravest"
     )
     assert err == (
         "limits   'slip' declares no range; audited from -2.5 to 3.5, where its "
