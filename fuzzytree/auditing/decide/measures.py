@@ -35,10 +35,6 @@ class Bounds(NamedTuple):
     high: Fraction
 
 
-CurveValue = tuple[Bounds, Fraction]
-"""A value, and a place where a function has it or comes near it."""
-
-
 def integral(lines: Lines) -> Fraction:
     """Return the area under lines."""
     return sum(((b - a) * (p + q) / 2 for a, b, p, q in lines.pieces()), start=ZERO)
@@ -46,21 +42,10 @@ def integral(lines: Lines) -> Fraction:
 
 def area(of: Between) -> Bounds:
     """Return the area under a function."""
-    low = integral(of.lower)
-    return Bounds(low, low if of.is_exact else integral(of.upper))
+    return Bounds(integral(of.lower), integral(of.upper))
 
 
-def walk(of: Between) -> list[CurveValue]:
-    """Return a function's values from left to right; at a jump all, with its place."""
-    both = zip(of.lower.at, of.upper.at, strict=True)
-    values = [(x, 1, *ends) for x, ends in zip(of.lower.x, both, strict=True)]
-    if of.is_exact:  # limits; those of an enclosure are no values
-        for a, b, p, q in of.lower.pieces():
-            values += [(a, 2, p, p), (b, 0, q, q)]
-    return [(Bounds(*ends), x) for x, _, *ends in sorted(values)]
-
-
-def height(of: Between) -> CurveValue:
+def height(of: Between) -> tuple[Bounds, Fraction]:
     """Return the supremum of a function, and the first place where it is near.
 
     Example:
@@ -68,37 +53,44 @@ def height(of: Between) -> CurveValue:
         >>> height(lines_of(Points((0.0, 2.0), (0.0, 1.0)), ZERO, ONE))[0].low
         Fraction(1, 2)
     """
-    lower, upper = of
-    values = [*zip(lower.at, lower.x, strict=True)]
-    if of.is_exact:
-        values += [one for a, b, p, q in lower.pieces() for one in ((p, a), (q, b))]
-    low, at = max(values, key=lambda one: (one[0], -one[1]))
-    return Bounds(low, low if of.is_exact else upper.highest), at
+    values = [(degree, -x) for x, _, degree in _walk(of)]
+    low, at = max(values)
+    return Bounds(low, low if of.is_exact else of.upper.highest), -at
 
 
-def dips(
-    values: Sequence[CurveValue], least: Fraction
-) -> list[tuple[CurveValue, CurveValue, CurveValue]]:
-    """Return where values fall and rise again, by at least some amount above 0.
+Dip = tuple[tuple[Fraction, Fraction], ...]
+"""A peak, the valley behind it and the peak behind that: places and degrees."""
 
-    Returns:
-        The peak before, the valley, and the peak behind it.
+
+def dips(of: Between, least: Fraction) -> list[Dip]:
+    """Return where a function falls and rises again, by at least some amount above 0.
 
     Example:
-        >>> walked = [(Bounds(Fraction(v), Fraction(v)), Fraction(k))
-        ...           for k, v in enumerate((0, 3, 1, 2, 0))]
-        >>> [[int(at) for _, at in dip] for dip in dips(walked, Fraction(1, 2))]
+        >>> from fuzzytree.model import Points
+        >>> zigzag = Points((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 0.25, 0.5))
+        >>> made = dips(lines_of(zigzag, ZERO, Fraction(9)), Fraction(1, 8))
+        >>> [[int(x) for x, _ in dip] for dip in made]
         [[1, 2, 3]]
     """
-    turns = [values[0]]  # a peak, a valley, a peak and so on
-    for value in values[1:]:
-        rise = value[0].low - turns[-1][0].low
+    places = [(x, degree) for x, _, degree in _walk(of)]
+    turns = places[:1]  # a peak, a valley, a peak and so on
+    for place in places[1:]:
+        rise = place[1] - turns[-1][1]
         farther = rise if len(turns) % 2 else -rise
         if farther > 0:
-            turns[-1] = value
+            turns[-1] = place
         elif -farther >= least:
-            turns.append(value)
+            turns.append(place)
     return [*zip(turns[::2], turns[1::2], turns[2::2], strict=False)]
+
+
+def _walk(of: Between) -> list[tuple[Fraction, int, Fraction]]:
+    """Return degrees from left to right; where it is exact also limits at jumps."""
+    values = [(x, 1, degree) for x, degree in zip(of.lower.x, of.lower.at, strict=True)]
+    if of.is_exact:
+        for a, b, p, q in of.lower.pieces():
+            values += [(a, 2, p), (b, 0, q)]
+    return sorted(values)
 
 
 # --- two functions
@@ -161,10 +153,7 @@ def most_shared(curves: Sequence[Between]) -> FloatArray:
     """Return bounds from above of the shared by the joined area of each two functions.
 
     On a cell two share no more than the smaller of their areas, and join no less than
-    the larger one. Only what comes near to an answer is worth the exact areas.
-
-    Returns:
-        Shape (functions, functions); 1 where nothing is known.
+    the larger one. It is 1 where nothing is known.
     """
     least, most = (
         np.array([_cell_areas(of[side]) for of in curves]) for side in (0, 1)

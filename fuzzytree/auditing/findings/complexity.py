@@ -18,34 +18,19 @@ from fuzzytree.model import depth
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Count rules, propositions and terms, and compute the index of Nauck."""
-    rules = subject.rules
-    propositions, used = (
-        [len(rule.when) for rule in rules.rules],
-        set(used_terms(rules)),
-    )
+    lengths = [len(rule.when) for rule in subject.rules.rules]
+    used = set(used_terms(subject.rules))
     measures = [
-        Measure("rules", len(propositions)),
-        Measure("propositions", sum(propositions)),
-        Measure("most propositions of a rule", max(propositions)),
-        Measure("propositions per rule", sum(propositions) / len(propositions)),
+        Measure("rules", len(lengths)),
+        Measure("propositions", sum(lengths)),
+        Measure("most propositions of a rule", max(lengths)),
+        Measure("propositions per rule", sum(lengths) / len(lengths)),
         Measure("distinct terms in use", len(used)),
         Measure("variables in use", len({variable for variable, _ in used})),
     ]
     if subject.tree is not None:
         measures.append(Measure("depth of the tree", depth(subject.tree)))
-    index = nauck(subject)
-    if index is not None:
-        names = ("complexity", "coverage", "partition")
-        measures += [
-            measure(f"{name} of Nauck", value)
-            for name, value in zip(names, index, strict=True)
-        ]
-        size, covered, partition = index
-        product = Bounds(
-            size.low * covered.low * partition.low,
-            size.high * covered.high * partition.high,
-        )
-        measures.append(measure("index of Nauck", product))
+    measures += [measure(f"{name} of Nauck", value) for name, value in nauck(subject)]
     # Of a view ways count, and rules left out do not.
     is_view = subject.system is not None and subject.policy.decision == "all"
     message = "FT501.size-of-view" if is_view else "FT501.size"
@@ -53,8 +38,8 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     yield audit_answer(message, "the rule base", how, measures=tuple(measures))
 
 
-def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
-    """Return the three factors of the index of Nauck on the domain.
+def nauck(subject: Subject) -> list[tuple[str, Bounds]]:
+    """Return the three factors of the index of Nauck on the domain, and their product.
 
     D. D. Nauck, "Measuring interpretability in rule-based classification systems",
     FUZZ-IEEE 2003, pages 196 to 201. With m classes, n_k variables in rule k, and p_i
@@ -69,33 +54,27 @@ def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
     Integrals are taken exactly, not on a grid.
 
     Returns:
-        None if no rule uses a variable, a range is a point, or a term has no exact
-        shape.
+        None of them if no rule uses a variable, a range is a point, or a term has no
+        exact shape.
     """
     terms = set(used_terms(subject.rules))
-    if subject.bounds and not terms.isdisjoint(subject.bounds.terms):
-        return None
     names = {variable for variable, _ in terms}
     used = [of for of in ranges(subject) if of.variable.name in names]
+    is_known = subject.bounds is None or terms.isdisjoint(subject.bounds.terms)
+    if not used or not is_known or any(of.low == of.high for of in used):
+        return []
     lengths = [len({c.variable for c in rule.when}) for rule in subject.rules.rules]
-    if not used or any(of.low == of.high for of in used):
-        return None
     size = Fraction(len(subject.rules.classes), sum(lengths))
-    coverages: list[Bounds] = []
-    for of in used:
-        subject.clock.check()
-        coverages.append(coverage(of))
-    counts = [len(of.variable.terms) for of in used]
-    shares = [Fraction(1, max(count - 1, 1)) for count in counts]
-    partition = sum(shares, ZERO) / len(shares)
-    return (
-        Bounds(size, size),
-        Bounds(
-            sum((one.low for one in coverages), ZERO) / len(coverages),
-            sum((one.high for one in coverages), ZERO) / len(coverages),
-        ),
-        Bounds(partition, partition),
-    )
+    each = [coverage(of) for of in used]
+    low, high = (sum(ends, ZERO) / len(used) for ends in zip(*each, strict=True))
+    shares = (Fraction(1, max(len(of.terms) - 1, 1)) for of in used)
+    partition = sum(shares, ZERO) / len(used)
+    return [
+        ("complexity", Bounds(size, size)),
+        ("coverage", Bounds(low, high)),
+        ("partition", Bounds(partition, partition)),
+        ("index", Bounds(size * low * partition, size * high * partition)),
+    ]
 
 
 def coverage(of: VariableRange) -> Bounds:
@@ -105,23 +84,18 @@ def coverage(of: VariableRange) -> Bounds:
         >>> from fuzzytree.model.rulebase import Points, Term, Variable
         >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
         >>> both = Variable("x", (Term("low", down), Term("high", up)))
-        >>> coverage(VariableRange(both, Fraction(0), Fraction(1), False)).low
+        >>> coverage(VariableRange(both, ZERO, ONE)).low
         Fraction(1, 1)
     """
-    curves = [of.lines(term.shape) for term in of.variable.terms]
+    curves = [of.lines(term.shape) for term in of.terms]
     low, high = curves[0].lower.x[0], curves[0].lower.x[-1]
-    count = len(curves)
-    level = constant(ONE, low, high)
-    totals: list[Fraction] = []
+    level, totals = constant(ONE, low, high), list[Fraction]()
     for side in (0, 1):
-        summed = combined([one[side] for one in curves], lambda both: both[0] + both[1])
-        total = integral(combined([summed, level], min))
-        if count > 1:  # what is above 1 is taken off; two terms or more are needed
-            over = integral(combined([summed, level], max)) - (high - low)
-            total -= over / (count - 1)
-        totals.append(total)
+        lines = combined([one[side] for one in curves], lambda both: both[0] + both[1])
+        below = integral(combined([lines, level], min))
+        above = integral(lines) - below  # of two terms or more
+        totals.append(below - above / max(len(curves) - 1, 1))
     # Where degrees are enclosed, h differs by no more than their sum does.
     slack = sum((integral(c.upper) - integral(c.lower) for c in curves), ZERO) / 2
-    total = sum(totals, ZERO) / 2
-    width = high - low
+    total, width = sum(totals, ZERO) / 2, high - low
     return Bounds(max(total - slack, ZERO) / width, min((total + slack) / width, ONE))

@@ -19,7 +19,6 @@ from fuzzytree.auditing.decide.measures import (
     integral,
     most_shared,
     overlap,
-    walk,
 )
 from fuzzytree.model import (
     Arc,
@@ -174,16 +173,6 @@ def test_curves_are_equal_where_they_cross(seed: int) -> None:
         assert min(a for a, _ in ends) - tiny <= height <= max(ends)[1] + tiny
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_walk_is_monotone_between_neighbours(seed: int) -> None:
-    for shape in shapes(seed):
-        for (a, start), (b, end) in itertools.pairwise(walk(on_unit(shape))):
-            for share in (Fraction(1, 7), Fraction(1, 2), Fraction(6, 7)):
-                if start < end:
-                    degree = exact_degree(shape, start + (end - start) * share)
-                    assert min(a.low, b.low) <= degree <= max(a.high, b.high)
-
-
 def test_areas_of_two_parts_add_up() -> None:
     for curve in CURVES:
         total, *halves = (
@@ -197,7 +186,7 @@ def test_areas_of_two_parts_add_up() -> None:
 def test_a_line_of_one_point_has_one_value_and_no_area() -> None:
     made = lines_of(Points((0.0, 2.0), (0.0, 1.0)), ONE, ONE)
     half = Bounds(Fraction(1, 2), Fraction(1, 2))
-    assert walk(made) == [(half, ONE)] == [height(made)]
+    assert height(made) == (half, ONE)
     assert integral(made.lower) == 0
 
 
@@ -209,10 +198,16 @@ def test_a_curve_is_no_farther_from_itself_than_its_bounds() -> None:
 
 def test_every_dip_of_a_zigzag_is_found() -> None:
     zigzag = Points((0.0, 1.0, 2.0, 3.0, 4.0, 5.0), (0.5, 0.0, 1.0, 0.4, 0.7, 0.6))
-    walked = walk(lines_of(zigzag, ZERO, Fraction(5)))
+    lines = lines_of(zigzag, ZERO, Fraction(5))
     places = [
-        [[float(at) for _, at in dip] for dip in dips(walked, least)]
+        [[float(at) for at, _ in dip] for dip in dips(lines, least)]
         for least in (Fraction(1, 20), Fraction(1, 5), Fraction(2, 5))
     ]
     both = [[0.0, 1.0, 2.0], [2.0, 3.0, 4.0]]
     assert places == [both, both, both[:1]]
+
+
+def test_a_dip_at_a_jump_is_as_deep_as_its_limits() -> None:
+    steps = Points((0.0, 1.0, 1.0, 2.0, 2.0), (1.0, 1.0, 0.25, 0.5, 0.75))
+    ((_, valley, peak),) = dips(lines_of(steps, ZERO, Fraction(3)), Fraction(1, 10))
+    assert (valley, peak) == ((ONE, Fraction(1, 4)), (Fraction(2), Fraction(3, 4)))
