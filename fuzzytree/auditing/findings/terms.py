@@ -78,15 +78,15 @@ def ranges(subject: Subject) -> tuple[VariableRange, ...]:
     Terms that only the view of a system has, such as `very high`, are left out.
     """
     result: list[VariableRange] = []
-    system = subject.system if subject.bounds else None  # nothing else has bounds
-    own = {*_terms(system.variables)} if system else None
+    whole = subject.system if subject.bounds and subject.system else subject.rules
+    own = {*_terms(whole.variables)}
     bounds = subject.bounds.terms if subject.bounds else {}
     for variable in subject.rules.variables:
         name, side = variable.name, subject.domain.side(variable.name)
         low, high = span(variable, subject.domain)
         if low > high:
             return ()
-        terms = [t for t in variable.terms if own is None or (name, t.name) in own]
+        terms = [t for t in variable.terms if (name, t.name) in own]
         if terms:
             variable = replace(variable, terms=tuple(terms))
             between = {of[1]: one for of, one in bounds.items() if of[0] == name}
@@ -306,17 +306,16 @@ def _polynomial(curve: Sequence[float], t: Fraction) -> Fraction:
 def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
     lines = of.lines(term.shape)
     deep = measures.dips(lines, SHALLOW)
-    smaller = len(measures.dips(lines, Fraction(1, 10**12))) - len(deep)
-    yield from [None] * smaller
+    smaller = measures.dips(lines, Fraction(1, 10**12))
+    yield from [None] * (len(smaller) - len(deep))
     if not deep:
         return
     depths = [min(a, c) - b for (_, a), (_, b), (_, c) in deep]
-    depth = max(depths)
-    (left, _), (valley, bottom), (right, _) = deep[depths.index(depth)]
+    (left, _), (valley, bottom), (right, _) = deep[depths.index(max(depths))]
     how = Proved("its curve was evaluated at the ends of all its lines")
     numbers = (
         Measure("peaks", len(deep) + 1),
-        Measure("depth of the deepest dip", float(depth)),
+        Measure("depth of the deepest dip", float(max(depths))),
         Measure("place of the deepest dip", float(valley), unit=of.variable.unit),
     )
     facts, ends = {"bottom": float(bottom)}, (left, right)
@@ -324,11 +323,7 @@ def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
 
 
 def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
-    """Return the share of a curve's area that lies on a range.
-
-    Returns:
-        None if the curve has no end, or no area, or the range is a point.
-    """
+    """Return the share of a curve's area that lies on a range; None of no area."""
     knots = [Fraction(knot) for knot in shape.knots()]
     if len(set(knots)) < 2 or of.low == of.high:
         return None
@@ -380,8 +375,23 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
                 overlaps.append((-shared.jaccard.low, answer))
     overlaps.sort(key=lambda pair: pair[0])
     yield from (answer for _, answer in overlaps[:MOST_SHOWN])
+    more = max(len(overlaps) - MOST_SHOWN, 0)
+    counts = {"more": more, "points": points}
+    facts = {"overlap": float(limit)} | {name: n for name, n in counts.items() if n}
     if overlaps or apart or points:
-        yield _other_pairs(len(overlaps), apart, points, float(limit))
+        yield audit_answer(
+            "FT403.unlisted" if more else "FT403.others",
+            "pairs of terms",
+            Proved(
+                "areas were bounded on cells, and integrated in fractions where near"
+            ),
+            measures=(
+                Measure("pairs apart", apart),
+                Measure("pairs not listed", more),
+                Measure("pairs without area", points),
+            ),
+            facts=facts,
+        )
 
 
 def _overlapping(
@@ -410,17 +420,3 @@ def _overlapping(
         numbers.append(measure("crossing height", Bounds(degree, degree)))
         numbers.append(Measure("crossing", float(at), unit=of.variable.unit))
     return _about(message, of, pair, state, facts, *numbers)
-
-
-def _other_pairs(count: int, apart: int, points: int, limit: float) -> AuditAnswer:
-    more = max(count - MOST_SHOWN, 0)
-    facts = {"overlap": limit} | ({"more": more} if more else {})
-    facts |= {"points": points} if points else {}
-    numbers = (
-        Measure("pairs apart", apart),
-        Measure("pairs not listed", more),
-        Measure("pairs without area", points),
-    )
-    message = "FT403.unlisted" if more else "FT403.others"
-    how = Proved("areas were bounded on cells, and integrated in fractions where near")
-    return audit_answer(message, "pairs of terms", how, measures=numbers, facts=facts)
