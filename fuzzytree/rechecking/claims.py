@@ -319,8 +319,9 @@ def within(case: Case, answer: Answer) -> Statements:
         sign = ">=" if is_weak else ">"
         wrong = any_of(case.reaches(n, sign, level) for n in case.numbers)
         yield from covers(case, answer) if is_weak else ()
-    text = f"{answer.subject} is so in all of its region"
-    yield Statement(text, all_of([f"(not {any_of(outside)})", wrong]))
+    if outside:
+        text = f"{answer.subject} is so in all of its region"
+        yield Statement(text, all_of([f"(not {any_of(outside)})", wrong]))
 
 
 def no_more_gaps(case: Case, gaps: list[Answer]) -> Statement:

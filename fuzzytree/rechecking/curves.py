@@ -10,7 +10,7 @@ import functools
 import itertools
 import math
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from decimal import Context, Decimal
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -51,6 +51,8 @@ def knots(curve: Curve) -> list[Fraction]:
         signs = zip((-1, -1, 1, 1), sides, strict=True)
         mean = Fraction(n[0])
         return sorted([mean, *(mean + sign * far for sign, far in signs)])
+    if curve.kind in ("product", "difference"):
+        return sorted({x for part in n for x in knots(part)})
     ends = [Fraction(end) for end in n if isinstance(end, float)]
     if curve.kind == "band":
         pairs = [(n[0], n[2]), (n[1], n[3])]
@@ -61,8 +63,8 @@ def knots(curve: Curve) -> list[Fraction]:
         ]
     if curve.kind == "trapezoid" and n[0] is not None and n[0] == n[1]:
         ends.append(Fraction(math.nextafter(n[1], -math.inf)))  # 1 from there on
-    if curve.kind in ("pi", "s", "semi ellipse"):
-        ends += [(a + b) / 2 for a, b in zip(ends[::2], ends[1::2], strict=True)]
+    if curve.kind in ("s", "semi ellipse"):
+        ends.append((ends[0] + ends[1]) / 2)
     return sorted({*ends})
 
 
@@ -84,13 +86,13 @@ def bounds(curve: Curve, low: Fraction, high: Fraction) -> Between:
         for a, b in itertools.pairwise(ends):  # the limits at the ends of each line
             p, q = (_straight(curve, (k * a + (3 - k) * b) / 3) for k in (2, 1))
             degrees += [2 * p - q, 2 * q - p]
-        one = max(min(degrees), ZERO), min(max(degrees), ONE)
+        result = min(degrees), max(degrees)
     else:
-        one = _enclosed(curve, low, high)
-    one = max(one[0], ZERO) * curve.height, min(one[1], ONE) * curve.height
+        result = _enclosed(curve, low, high)
+    result = max(result[0], ZERO) * curve.height, min(result[1], ONE) * curve.height
     for hedge in reversed(curve.hedges):
-        one = _hedged(hedge, one)
-    return one
+        result = _hedged(hedge, result)
+    return result
 
 
 def _straight(curve: Curve, x: Fraction) -> Fraction:
@@ -136,18 +138,19 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
         left = _side(mean - high, mean - low, n[1])
         right = _side(low - mean, high - mean, n[2])
         return min(left[0], right[0]), min(left[1], right[1])
-    if curve.kind in PAIRS:
-        a, b = (_enclosed(one, low, high) for one in PAIRS[curve.kind](*n))
-        if curve.kind != "sigmoid difference":
+    if curve.kind in ("product", "difference"):
+        a, b = (_enclosed(part, low, high) for part in n)
+        if curve.kind == "product":
             return a[0] * b[0], a[1] * b[1]
         least, most = a[0] - b[1], a[1] - b[0]
         return max(least, -most, ZERO), max(abs(least), abs(most))
-    if curve.kind not in DEGREES:
-        raise UndecidedError(f"a curve ({curve.kind}) is not evaluated here")
+    if curve.kind == "formula":
+        raise UndecidedError("a curve (formula) is not evaluated here")
     turns = [x for x in knots(curve) if low < x < high]
     numbers = [*map(Fraction, n)]
-    ends = [DEGREES[curve.kind](x, *numbers) for x in (low, *turns, high)]
-    return min(one for one, _ in ends), max(one for _, one in ends)
+    degree: Callable[..., Between] = DEGREES.get(curve.kind, _bell)
+    ends = [degree(x, *numbers) for x in (low, *turns, high)]
+    return min(end for end, _ in ends), max(end for _, end in ends)
 
 
 def _side(
@@ -185,7 +188,7 @@ def body(curve: tuple[float, ...]) -> tuple[Fraction, ...]:
     """Return the polynomial `1 - t (c0 + (2 t - 1) (c1 + ...))`, the lowest first."""
     poly: list[Fraction] = [ZERO]
     for c in reversed(curve):
-        twice = [ZERO, *(2 * one for one in poly)]
+        twice = [ZERO, *(2 * c for c in poly)]
         poly = [a - b for a, b in zip(twice, [*poly, ZERO], strict=True)]
         poly[0] += Fraction(c)
     return (ONE, *(-c for c in poly))
@@ -239,13 +242,6 @@ def _power(x: Fraction, power: Fraction) -> Between:
     return _falling(-low * power)[0], min(_falling(-high * power)[1], ONE)
 
 
-def _bell(x: Fraction, center: Fraction, width: Fraction, slope: Fraction) -> Between:
-    if x == center:
-        return (ONE, ONE) if slope > 0 else (ZERO, ZERO)
-    ends = [-2 * slope * one for one in _ln(abs(x - center) / width)]
-    return _logistic(min(ends))[0], _logistic(max(ends))[1]
-
-
 def _logistic(z: Fraction) -> Between:
     """Return between which numbers 1 / (1 + e**-z) lies."""
     low, high = _falling(abs(z))
@@ -271,112 +267,70 @@ def _cosine(x: Fraction, center: Fraction, width: Fraction) -> Between:
     return (1 + max(low - off, -ONE)) / 2, (1 + min(high + off, ONE)) / 2
 
 
-def _concave(x: Fraction, inflection: Fraction, end: Fraction) -> Between:
-    wide, sign = abs(end - inflection), 1 if end >= inflection else -1
-    far = wide + max((end - x) * sign, ZERO)
-    return (wide / far, wide / far) if far else (ONE, ONE)
-
-
-def _arc(x: Fraction, start: Fraction, end: Fraction) -> Between:
-    u = min(max((x - start) / (end - start), ZERO), ONE)
-    return _root(u * (2 - u))
-
-
-def _semi_ellipse(x: Fraction, start: Fraction, end: Fraction) -> Between:
-    u = min(abs(2 * x - start - end) / abs(end - start), ONE)
-    return _root(1 - u * u)
+def _bell(x: Fraction, center: Fraction, width: Fraction, slope: Fraction) -> Between:
+    if x == center:
+        return (ONE, ONE) if slope > 0 else (ZERO, ZERO)
+    ends = [-2 * slope * end for end in _ln(abs(x - center) / width)]
+    return _logistic(min(ends))[0], _logistic(max(ends))[1]
 
 
 def _gaussian(x: Fraction, mean: Fraction, deviation: Fraction) -> Between:
     return _falling(((x - mean) / deviation) ** 2 / 2)
 
 
-def _left_half(x: Fraction, mean: Fraction, deviation: Fraction) -> Between:
-    return _gaussian(min(x, mean), mean, deviation)
+def _concave(x: Fraction, inflection: Fraction, end: Fraction) -> Between:
+    wide, sign = abs(end - inflection), 1 if end >= inflection else -1
+    far = wide + max((end - x) * sign, ZERO)
+    return (wide / far, wide / far) if far else (ONE, ONE)
 
 
-def _right_half(x: Fraction, mean: Fraction, deviation: Fraction) -> Between:
-    return _gaussian(max(x, mean), mean, deviation)
-
-
-def _sigmoid(x: Fraction, inflection: Fraction, slope: Fraction) -> Between:
-    return _logistic(slope * (x - inflection))
-
-
-def _spike(x: Fraction, center: Fraction, width: Fraction) -> Between:
-    return _falling(10 * abs(x - center) / width)
-
-
-def _s_curve(x: Fraction, start: Fraction, end: Fraction) -> Between:
-    degree = _s(x, start, end)
+def _exact(degree: Fraction) -> Between:
     return degree, degree
 
 
-DEGREES: dict[str, Callable[..., Between]] = {
+def _share(x: Fraction) -> Fraction:
+    return min(max(x, ZERO), ONE)
+
+
+DEGREES: dict[str, Callable[[Fraction, Fraction, Fraction], Between]] = {
     "gaussian": _gaussian,
-    "left half": _left_half,
-    "right half": _right_half,
-    "sigmoid": _sigmoid,
-    "spike": _spike,
-    "s": _s_curve,
-    "bell": _bell,
+    "left half": lambda x, mean, d: _gaussian(min(x, mean), mean, d),
+    "right half": lambda x, mean, d: _gaussian(max(x, mean), mean, d),
+    "sigmoid": lambda x, inflection, slope: _logistic(slope * (x - inflection)),
+    "spike": lambda x, center, width: _falling(10 * abs(x - center) / width),
+    "s": lambda x, start, end: _exact(_s(x, start, end)),
     "cosine": _cosine,
     "concave": _concave,
-    "arc": _arc,
-    "semi ellipse": _semi_ellipse,
+    "arc": lambda x, a, b: _root(1 - (1 - _share((x - a) / (b - a))) ** 2),
+    "semi ellipse": lambda x, a, b: _root(
+        1 - _share(abs(2 * x - a - b) / abs(b - a)) ** 2
+    ),
 }
-"""Between which numbers a degree lies at a point."""
-
-
-def _sigmoids(*both: tuple[float, ...]) -> list[Curve]:
-    return [Curve("sigmoid", one) for one in both]
-
-
-def _halves(
-    left: float, left_deviation: float, right: float, right_deviation: float
-) -> list[Curve]:
-    return [
-        Curve("left half", (left, left_deviation)),
-        Curve("right half", (right, right_deviation)),
-    ]
-
-
-def _slopes(a: float, b: float, c: float, d: float) -> list[Curve]:
-    return [Curve("s", (a, b)), Curve("s", (d, c))]
-
-
-PAIRS: dict[str, Callable[..., list[Curve]]] = {
-    "two gaussians": _halves,
-    "pi": _slopes,
-    "sigmoid product": _sigmoids,
-    "sigmoid difference": _sigmoids,
-}
-"""Curves that are a product, or a difference, of two others."""
-
+"""Between which numbers a degree lies at a point; `_bell` has three numbers."""
 
 _HEDGES: dict[str, Callable[[Fraction], Between]] = {
     "any": lambda d: (ONE, ONE),
-    "very": lambda d: (d * d, d * d),
-    "cubed": lambda d: (d**3, d**3),
-    "very very": lambda d: (d**4, d**4),
+    "very": lambda d: _exact(d * d),
+    "cubed": lambda d: _exact(d**3),
+    "very very": lambda d: _exact(d**4),
     "somewhat": _root,
     "cube root": lambda d: _power(d, Fraction(1, 3)),
     "plus": lambda d: _power(d, Fraction(5, 4)),
     "minus": lambda d: _power(d, Fraction(3, 4)),
-    "extremely": lambda d: (_s(d, ZERO, ONE), _s(d, ZERO, ONE)),
-    "seldom": lambda d: (
-        _root(d / 2)
-        if 2 * d <= 1
-        else (1 - _root((1 - d) / 2)[1], 1 - _root((1 - d) / 2)[0])
-    ),
+    "extremely": lambda d: _exact(_s(d, ZERO, ONE)),
+    "seldom": lambda d: _root(d / 2) if 2 * d <= 1 else _complement(_root((1 - d) / 2)),
 }
 """What a hedge makes of a degree; all rise with it."""
 
 
-def _hedged(hedge: str, one: Between) -> Between:
+def _complement(degree: Between) -> Between:
+    return 1 - degree[1], 1 - degree[0]
+
+
+def _hedged(hedge: str, degree: Between) -> Between:
     if hedge == "not":
-        return 1 - one[1], 1 - one[0]
-    low, high = (min(max(end, ZERO), ONE) for end in one)
+        return _complement(degree)
+    low, high = map(_share, degree)
     return _HEDGES[hedge](low)[0], _HEDGES[hedge](high)[1]
 
 
@@ -397,14 +351,14 @@ SHAPES = {
 """The curves whose numbers have names, and these names in order."""
 
 
-def keys(one: Facts, needed: str, optional: str = "") -> None:
+def keys(facts: Facts, needed: str, optional: str = "") -> None:
     """Refuse facts that lack a key, or have another one.
 
     Raises:
         CannotRunError: If they do.
     """
     must = {*needed.split(", ")}
-    wrong = sorted(must - one.keys() | one.keys() - must - {*optional.split(", ")})
+    wrong = sorted(must - facts.keys() | facts.keys() - must - {*optional.split(", ")})
     if wrong:
         raise CannotRunError(f"missing or unknown: {', '.join(map(repr, wrong)):.200}")
 
@@ -415,86 +369,84 @@ def number_of(value: Any) -> float:
     Raises:
         CannotRunError: If it is none.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise CannotRunError(f"no number: {value!r:.60}")
-    if not math.isfinite(value):
-        raise CannotRunError(f"not finite: {value!r:.60}")
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not math.isfinite(value):
+        raise CannotRunError(f"no finite number: {value!r:.60}")
     return float(value)
 
 
-def curve_of(one: Facts) -> Curve:
+def curve_of(facts: Facts) -> Curve:
     """Return the membership function of a term.
 
     Raises:
         CannotRunError: If it is not known here.
     """
-    height = Fraction(number_of(one.pop("height", 1)))
-    if one == {"degree": 1}:
+    height = Fraction(number_of(facts.pop("height", 1)))
+    if facts == {"degree": 1}:
         return Curve("band", (None,) * 4, height)
-    if "mean" in one and one.keys() & {"spread", "left"}:
-        keys(
-            one, "mean, left, right" if "left" in one else "mean, spread, curve, reach"
-        )
-        sides = []
-        for side in (one.get("left", one), one.get("right", one)):
-            spread, reach = number_of(side["spread"]), number_of(side["reach"])
-            if spread <= 0 or reach <= 1 or not 1 <= len(side["curve"]) <= 8:
-                raise CannotRunError("a side of no set")
-            sides.append((spread, tuple(map(number_of, side["curve"])), reach))
-        return Curve("lr", (number_of(one["mean"]), *sides), height)
-    if one and one.keys() <= {"0 up to", "above", "up to", "0 from"}:
+    if "mean" in facts and facts.keys() & {"spread", "left"}:
+        own = "left, right" if "left" in facts else "spread, curve, reach"
+        keys(facts, f"mean, {own}")
+        sides = (facts.get(name, facts) for name in ("left", "right"))
+        return Curve("lr", (number_of(facts["mean"]), *map(_lr_side, sides)), height)
+    if facts and facts.keys() <= {"0 up to", "above", "up to", "0 from"}:
         names = ("above", "up to", "0 up to", "0 from")
-        ends = tuple(None if n not in one else number_of(one[n]) for n in names)
-        order = [end for end in (ends[2], ends[0], ends[1], ends[3]) if end is not None]
-        if order != sorted({*order}):
-            raise CannotRunError("a plateau whose ends are swapped")
+        ends = tuple(None if n not in facts else number_of(facts[n]) for n in names)
+        _check_order((ends[2], ends[0], ends[1], ends[3]), is_strict=True)
         return Curve("band", ends, height)
-    ((kind, data),) = one.items()
+    ((kind, data),) = facts.items()
+    return _curve(kind, data)._replace(height=height)
+
+
+def _lr_side(facts: Facts) -> tuple[float, tuple[float, ...], float]:
+    spread, reach = number_of(facts["spread"]), number_of(facts["reach"])
+    if spread <= 0 or reach <= 1 or not 1 <= len(facts["curve"]) <= 8:
+        raise CannotRunError("a side of no set")
+    return spread, tuple(map(number_of, facts["curve"])), reach
+
+
+def _check_order(ends: Iterable[float | None], *, is_strict: bool = False) -> None:
+    order = [end for end in ends if end is not None]
+    if order != (sorted({*order}) if is_strict else sorted(order)):
+        raise CannotRunError("a curve whose ends are swapped")
+
+
+def _curve(kind: str, data: Any) -> Curve:
     if kind == "formula":
-        return Curve(kind, (str(data),), height)
-    return Curve(*_numbers(kind, data), height)
-
-
-def _numbers(kind: str, data: Any) -> tuple[str, tuple[Any, ...]]:
+        return Curve(kind, (str(data),))
     if kind == "points":
-        values, degrees = zip(*data, strict=True)
-        points = tuple(map(number_of, values)), tuple(map(number_of, degrees))
-        if [*points[0]] != sorted(points[0]) or not all(0 <= y <= 1 for y in points[1]):
+        values, degrees = (tuple(map(number_of, of)) for of in zip(*data, strict=True))
+        _check_order(values)
+        if not all(0 <= y <= 1 for y in degrees):
             raise CannotRunError("points that are no function")
-        return kind, points
+        return Curve(kind, (values, degrees))
     if kind in SHAPES:
         keys(data, SHAPES[kind])
-        numbers = tuple(number_of(data[name]) for name in SHAPES[kind].split(", "))
-        is_wide = all(
-            numbers[i] > 0
-            for i, n in enumerate(SHAPES[kind].split(", "))
-            if n in ("width",) or n.endswith("deviation")
-        )
-        if not is_wide:
+        numbers = {name: number_of(data[name]) for name in SHAPES[kind].split(", ")}
+        if any(
+            x <= 0 for n, x in numbers.items() if n.endswith(("width", "deviation"))
+        ):
             raise CannotRunError("a curve without width")
-        return kind, numbers
+        ends = (*numbers.values(),)
+        if kind == "two gaussians":
+            halves = Curve("left half", ends[:2]), Curve("right half", ends[2:])
+            return Curve("product", halves)
+        return Curve(kind, ends)
+    if kind in ("sigmoid difference", "sigmoid product"):
+        first, second = (_curve("sigmoid", of) for of in data)
+        return Curve(kind.removeprefix("sigmoid "), (first, second))
+    if kind == "pi":
+        a, b, c, d = map(number_of, data)
+        return Curve("product", (Curve("s", (a, b)), Curve("s", (d, c))))
     if kind in ("trapezoid", "triangle"):
         a, *inner, d = data
         b, c = map(number_of, inner if kind == "trapezoid" else inner * 2)
-        ends = (
-            None if a == -math.inf else number_of(a),
-            b,
-            c,
-            None if d == math.inf else number_of(d),
-        )
-        order = [end for end in ends if end is not None]
-        if order != sorted(order):
-            raise CannotRunError("a trapezoid whose ends are swapped")
-        return "trapezoid", ends
-    if kind in ("sigmoid difference", "sigmoid product"):
-        first, second = data
-        return kind, (_numbers("sigmoid", first)[1], _numbers("sigmoid", second)[1])
-    if kind == "pi":
-        a, b, c, d = map(number_of, data)
-        return kind, (a, b, c, d)
+        left = None if a == -math.inf else number_of(a)
+        right = None if d == math.inf else number_of(d)
+        _check_order((left, b, c, right))
+        return Curve("trapezoid", (left, b, c, right))
     if kind not in ("singleton", "at least", "at most"):
         raise CannotRunError(f"a curve ({kind:.60}) is not known")
     x = number_of(data)
-    if kind == "singleton":
-        return "trapezoid", (x, x, x, x)
-    return "trapezoid", (x, x, x, None) if kind == "at least" else (None, x, x, x)
+    left, right = None if kind == "at most" else x, None if kind == "at least" else x
+    return Curve("trapezoid", (left, x, x, right))

@@ -69,6 +69,8 @@ class Report:
         where = f"answer {number} ({answer.code}, {answer.subject:.60})"
         try:
             yield
+        except CannotRunError:
+            raise
         except DoesNotHoldError as error:
             self._refute(number, where, str(error))
         except UndecidedError as error:
