@@ -469,7 +469,7 @@ def _judge(results: list[tuple[Statement, str]], *, is_exact: bool) -> None:
         if result == "unknown":
             reasons.append("beyond the budget of the solver")
         elif is_certain:
-            reasons.append("it may be so only where strengths are equal")
+            reasons.append("it may be so only where strengths are equal, or 0")
         else:
             reasons.append("curves that are no lines, and too near to each other")
     if reasons:

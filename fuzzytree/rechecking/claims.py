@@ -180,7 +180,8 @@ def no_other_hidden(case: Case, answer: Answer) -> Statements:
         for weak, strong in (pair, pair[::-1]) if is_alike else (pair,):
             if not case.is_above(strong, weak):
                 text = f"{case.name(strong)} is somewhere above {case.name(weak)}"
-                yield Statement(text, case.over(strong, [weak]), "sat")
+                is_sure = any(every[strong - 1][0] > 0 for _, every in case.samples)
+                yield Statement(text, case.over(strong, [weak]), "sat", is_sure)
 
 
 def _apart(case: Case, a: int, b: int) -> str:
