@@ -401,7 +401,7 @@ def counted(case: Case, answer: Answer) -> Statements:
 
 def unused(case: Case, answer: Answer) -> Statements:
     """Check that the findings are the terms and variables that no rule uses."""
-    model, labels = case.model, case.model.asked
+    model, labels = case.model, case.model.labels_in_use
     names = {variable for variable, _ in labels}
     for variable in model.variables.values():
         if variable.name in names:

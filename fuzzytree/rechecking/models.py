@@ -46,10 +46,13 @@ class Proposition(NamedTuple):
         return f"{self.variable} {verb} {' or '.join(self.terms)}"
 
 
+Way = tuple[Proposition, ...]
+
+
 class Rule(NamedTuple):
     """A rule: what must hold, and the class or the text of what it concludes."""
 
-    when: tuple[Proposition, ...]
+    when: Way
     then: str
 
 
@@ -95,7 +98,6 @@ class Model:
         form: What an audit calls it.
         rules: The rules; of a tree the relative ones, of a system its ways.
         raw: The raw rules of a tree.
-        nodes: The nodes of a tree, from the root.
         paths: The path to each leaf of a tree.
         names: What answers call each rule.
         numbers: The number in the file of each rule, from 1.
@@ -103,7 +105,7 @@ class Model:
         absent: The numbers in the file of rules that are not audited, by name.
         reasons: Why rules of a system are left out, by name.
         labels: Every term of an input, by its variable.
-        asked: The variables and terms that the file's rules use.
+        labels_in_use: The variables and terms that the file's rules use.
         places: The lines and columns of rules and terms in the file.
     """
 
@@ -132,42 +134,38 @@ class Model:
 
     def _read(self, top: Facts, kind: str, left_out: set[str]) -> None:
         meaning = top.get("semantics", {})
-        if top.get("format") != "fuzzytree/1" or not (
-            MEANINGS[kind].items() <= meaning.items()
-        ):
+        is_ours = top.get("format") == "fuzzytree/1"
+        if not is_ours or not MEANINGS[kind].items() <= meaning.items():
             raise CannotRunError("its meaning is not known")
         keys(top, f"format, kind, name, semantics, {NEEDED[kind]}", OPTIONAL[kind])
-        self.name, self.kind, self.facts = str(top["name"]), kind, top
+        self.name, self.facts = str(top["name"]), top
         self.raw: Rules | None = None
-        self.nodes: list[Facts] = []
         self.paths: list[Steps] = []
         self.silent: list[str] = []
         self.absent: dict[str, int] = {}
-        self.is_whole, self.reasons = True, dict[str, str]()
-        self.places: list[Place] = [*_places(top.get("rules", top.get("leaves")))]
+        self.reasons: dict[str, str] = {}
+        self.places = [*_places(top.get("rules", top.get("leaves")))]
         for block in top.get("blocks", []):
             self.places += _places(block["rules"])
         self.term_places: dict[tuple[str, str], Place] = {}
-        for one in (
-            o for k in ("variables", "outputs", "sets") for o in top.get(k, [])
-        ):
-            terms, of = one.get("terms", []), one.get("name", one.get("variable"))
-            for term, place in zip(terms, _places(terms), strict=False):
-                self.term_places.setdefault((of, term["name"]), place)
-        variables = [_variable(one) for one in top.get("variables", [])]
-        self.variables = {one.name: one for one in variables}
-        once([one.name for one in variables])
+        for key in ("variables", "outputs", "sets"):
+            for entry in top.get(key, []):
+                terms = entry.get("terms", [])
+                name = entry.get("name", entry.get("variable"))
+                for term, place in zip(terms, _places(terms), strict=False):
+                    self.term_places.setdefault((name, term["name"]), place)
+        variables = [_variable(entry) for entry in top.get("variables", [])]
+        self.variables = {variable.name: variable for variable in variables}
+        refuse_twice([variable.name for variable in variables])
+        self.labels_in_use: set[tuple[str, str]] = set()
         self.labels = [(v.name, term) for v in variables for term in v.curves]
         if kind == "system":
             self._read_system(top, left_out)
             return
         self.missing = _class(meaning["missing"])
         self.uncovered = _class(meaning["uncovered"])
-        keys(
-            meaning,
-            f"and, uncovered, missing, {', '.join(MEANINGS[kind])}",
-            "label type, sharpness, floor",
-        )
+        always = f"and, uncovered, missing, {', '.join(MEANINGS[kind])}"
+        keys(meaning, always, "label type, sharpness, floor")
         if meaning["and"] not in ("minimum", "product"):
             raise CannotRunError("its AND is not known")
         self.is_product = meaning["and"] == "product"
@@ -175,98 +173,85 @@ class Model:
         if kind == "tree":
             self._read_tree(top)
         else:
-            rules = [_rule(one) for one in top["rules"]]
-            self.rules = self._rules(rules, self.variables)
+            self.rules = self._rules(map(_rule, top["rules"]), self.variables)
         self.numbers = [*range(1, len(self.rules.rules) + 1)]
         self.names = [f"rule {number}" for number in self.numbers]
-        self.asked = _used(self.rules)
-        self.lengths = [len(rule.when) for rule in self.rules.rules]
-        once(top["classes"])
-        self.class_count = len(top["classes"])
+        self.labels_in_use = _labels(self.rules.rules)
+        refuse_twice(top["classes"])
         if not {rule.then for rule in self.rules.rules} <= {*top["classes"]}:
             raise CannotRunError("a class that is not declared")
 
-    def _rules(self, rules: Sequence[Rule], variables: Mapping[str, Variable]) -> Rules:
-        known = {(v.name, term) for v in variables.values() for term in v.curves}
-        used = {(c.variable, t) for rule in rules for c in rule.when for t in c.terms}
-        if not rules or not used <= known:
+    def _rules(self, rules: Iterable[Rule], variables: Mapping[str, Variable]) -> Rules:
+        every = tuple(rules)
+        labels = {(v.name, term) for v in variables.values() for term in v.curves}
+        if not every or not _labels(every) <= labels:
             raise CannotRunError("rules of unknown terms, or none")
-        return Rules({**variables}, tuple(rules), self.is_product, self.uncovered)
+        return Rules({**variables}, every, self.is_product, self.uncovered)
 
     # --- trees
 
     def _read_tree(self, top: Facts) -> None:
-        self.form, self.nodes = "tree", top.get("nodes", [])
-        leaves, count = top["leaves"], 0
-        for number, leaf in enumerate(leaves, 1):
+        self.form, nodes, leaves = "tree", top.get("nodes", []), top["leaves"]
+        for leaf in leaves:
             keys(leaf, "leaf, class", "pattern, support, probabilities")
-            count += leaf["leaf"] == number
-        for number, node in enumerate(self.nodes, 1):
+        for node in nodes:
             keys(node, "node, ask, cuts, branches", "interval owners")
             ways = range(1, len(node["branches"]) + 1)
-            node["interval owners"] = node.get("interval owners", [*ways])
-            is_whole = {*node["interval owners"]} == {*ways} and node["node"] == number
-            is_whole &= sorted(node["cuts"]) == node["cuts"]
-            is_whole &= len(node["interval owners"]) == len(node["cuts"]) + 1
-            count += is_whole
-        if count != len(leaves) + len(self.nodes):
-            raise CannotRunError("nodes, leaves or intervals that lead nowhere")
-        ends: list[tuple[int, Steps]] = [(1 if self.nodes else -1, ())]
-        met: list[int] = []
+            owners = node.setdefault("interval owners", [*ways])
+            is_whole = sorted(node["cuts"]) == node["cuts"] and {*owners} == {*ways}
+            if not is_whole or len(owners) != len(node["cuts"]) + 1:
+                raise CannotRunError("intervals that lead nowhere")
+        ends: list[tuple[str, Steps]] = [("node 1" if nodes else "leaf 1", ())]
+        order: dict[str, list[Facts]] = {"node": [], "leaf": []}
         while ends:
-            number, path = ends.pop()
-            met.append(number)
-            if len(met) > len(self.nodes) + len(leaves):
-                break
-            if number < 0:
+            to, path = ends.pop()
+            kind, number = to.split(" ")
+            order[kind].append((nodes if kind == "node" else leaves)[int(number) - 1])
+            is_once = order[kind][-1][kind] == int(number) == len(order[kind])
+            if not is_once:  # each is reached once, in order
+                raise CannotRunError("nodes or leaves that lead nowhere")
+            if kind == "leaf":
                 self.paths.append(path)
                 continue
-            node = self.nodes[number - 1]
+            node = order[kind][-1]
             for place in reversed(range(len(node["branches"]))):
-                kind, to = node["branches"][place]["go to"].split(" ")
-                sign = {"leaf": -1, "node": 1}[kind]
-                ends.append((sign * int(to), (*path, (node, place))))
-        order = [*range(1, len(self.nodes) + 1)]
-        is_once = [n for n in met if n > 0] == order
-        if not is_once or [-n for n in met if n < 0] != [*range(1, len(leaves) + 1)]:
-            raise CannotRunError("nodes, leaves or intervals that lead nowhere")
+                ends.append((node["branches"][place]["go to"], (*path, (node, place))))
+        if (len(order["node"]), len(order["leaf"])) != (len(nodes), len(leaves)):
+            raise CannotRunError("nodes or leaves that are never reached")
         self.leaves: list[str] = [leaf["class"] for leaf in leaves]
-        self.rules = self._rules([*self._of_leaves("is")], self.variables)
-        sets = {one["variable"]: _curves(one["terms"]) for one in top.get("sets", [])}
-        fitted = {
-            one.name: one._replace(curves=sets.get(one.name, {}))
-            for one in self.variables.values()
-        }
+        self.rules = self._rules(self._of_leaves("is"), self.variables)
+        sets = {of["variable"]: _curves(of["terms"]) for of in top.get("sets", [])}
         if sets:
-            self.raw = self._rules([*self._of_leaves("sets")], fitted)
+            variables = self.variables.items()
+            raw = {n: v._replace(curves=sets.get(n, {})) for n, v in variables}
+            self.raw = self._rules(self._of_leaves("sets"), raw)
 
     def _of_leaves(self, key: str) -> Iterator[Rule]:
         for path, label in zip(self.paths, self.leaves, strict=True):
             when = [(node["ask"], node["branches"][way][key]) for node, way in path]
-            yield Rule(
-                tuple(Proposition(name, tuple(terms)) for name, terms in when), label
-            )
+            yield Rule(tuple(Proposition(n, tuple(terms)) for n, terms in when), label)
 
     def leaf_at(self, point: Point) -> int:
         """Return the number of the leaf of a tree that a point reaches."""
-        number = 1 if self.nodes else -1
-        while number > 0:
-            node = self.nodes[number - 1]
-            x = self.variables[node["ask"]].at(point)
-            owner = node["interval owners"][sum(x > cut for cut in node["cuts"])]
-            kind, to = node["branches"][owner - 1]["go to"].split(" ")
-            number = int(to) if kind == "node" else -int(to)
-        return -number
+        for number, path in enumerate(self.paths, 1):
+            if all(self._leads(point, node, place) for node, place in path):
+                return number
+        raise LookupError("no leaf")
+
+    def _leads(self, point: Point, node: Facts, place: int) -> bool:
+        x = self.variables[node["ask"]].at(point)
+        owners: list[int] = node["interval owners"]
+        cuts: list[float] = node["cuts"]
+        return owners[sum(x > cut for cut in cuts)] == place + 1
 
     # --- systems: a rule of `a and (b or c)` becomes two rules of an audit, its ways
 
     def _read_system(self, top: Facts, left_out: set[str]) -> None:
         self.form, self.missing, self.uncovered = "system", None, None
         keys(top["semantics"], ", ".join(MEANINGS["system"]))
-        self.outputs = [one["name"] for one in top["outputs"]]
-        once([*self.variables, *self.outputs])
+        refuse_twice([*self.variables, *(output["name"] for output in top["outputs"])])
         owners: list[tuple[str, Facts, Facts, Condition | None]] = []
-        counts = {"minimum": 0, "product": 0}
+        norms: list[str] = []
         for place, block in enumerate(top["blocks"], 1):
             keys(block, "rules, activation", "and, or, implication, name")
             end = f" of block {place}" if len(top["blocks"]) > 1 else ""
@@ -274,63 +259,50 @@ class Model:
                 keys(rule, "if, then", "weight, name")
                 condition = read_condition(rule["if"])
                 owners.append((f"rule {index}{end}", block, rule, condition))
-                if block.get("and") in counts:
-                    has_and = any(
-                        isinstance(o, Joint) and o.word == "and"
-                        for o in parts(condition)
-                    )
-                    counts[block["and"]] += has_and
-        self.is_product = counts["product"] > counts["minimum"]
+                every = [*parts(condition)]
+                self.labels_in_use |= {
+                    (p.variable, p.term or "") for p in every if isinstance(p, Is)
+                }
+                if any(isinstance(p, Joint) and p.word == "and" for p in every):
+                    norms.append(block.get("and", ""))
+        self.is_product = norms.count("product") > norms.count("minimum")
         rules: list[Rule] = []
-        self.lengths = list[int]()
         self.names, self.numbers = list[str](), list[int]()
         self.thens: list[tuple[Is, ...]] = []
-        self.asked = {
-            (one.variable, one.term or "")
-            for *_, condition in owners
-            for one in parts(condition)
-            if isinstance(one, Is)
-        }
         for number, (name, block, rule, condition) in enumerate(owners, 1):
-            weight, then = (
-                number_of(rule.get("weight", 1)),
-                read_conclusions(rule["then"]),
-            )
-            text = " and ".join(
+            weight = Fraction(number_of(rule.get("weight", 1)))
+            then = read_conclusions(rule["then"])
+            words = (
                 " ".join((c.variable, "is", *c.hedges, c.term or "")) for c in then
             )
+            text, ways = " and ".join(words), list[Way]()
             try:
                 ways = self.ways(condition, block) if weight else []
             except UndecidedError as error:
-                ways = []
-                self.is_whole = False
                 self.reasons[name] = str(error)
-                left_out.add(name)
-            if name in left_out:
-                self.is_whole = False
+            if name in left_out or name in self.reasons:
                 ways = []
             elif not ways:
                 self.silent.append(name)
             if not ways:
                 self.absent[name] = number
             for place, way in enumerate(ways, 1):
-                rules.append(Rule(self._weighted(way, Fraction(weight)), text))
-                self.lengths.append(len(way))
-                several = len(ways) > 1
-                self.names.append(f"way {place} of {name}" if several else name)
+                rules.append(Rule(self._weighted(way, weight), text))
+                self.names.append(f"way {place} of {name}" if len(ways) > 1 else name)
                 self.numbers.append(number)
                 self.thens.append(then)
-        hedged = {
-            v.name: v._replace(curves={**v.curves}) for v in self.variables.values()
-        }
-        for proposition in (c for rule in rules for c in rule.when):
-            for term in proposition.terms:
-                plain, *hedges = term.split("\0")
-                curves = hedged[proposition.variable].curves
-                whole = Curve("band", (None,) * 4) if not plain else curves[plain]
-                curves[term] = whole._replace(hedges=tuple(hedges))
-        self.rules = Rules(hedged, tuple(rules), self.is_product, None)
-        self.class_count = len({rule.then for rule in rules})
+        curves = {name: {**v.curves} for name, v in self.variables.items()}
+        for name, term in _labels(rules):
+            plain, *hedges = term.split("\0")
+            curve = curves[name][plain] if plain else Curve("band", (None,) * 4)
+            curves[name][term] = curve._replace(hedges=tuple(hedges))
+        variables = {n: v._replace(curves=curves[n]) for n, v in self.variables.items()}
+        self.rules = Rules(variables, tuple(rules), self.is_product, None)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether no rule of a system is left out."""
+        return {*self.absent} == {*self.silent}
 
     def _weighted(
         self, way: tuple[Proposition, ...], weight: Fraction
@@ -345,7 +317,7 @@ class Model:
 
     def ways(
         self, condition: Condition | None, block: Facts, *, negated: bool = False
-    ) -> list[tuple[Proposition, ...]]:
+    ) -> list[Way]:
         """Return the ways in which a condition holds, or does not; none if never.
 
         Raises:
@@ -371,7 +343,7 @@ class Model:
             norms = f"AND is {block.get('and')} and OR is {block.get('or')}"
             raise UndecidedError(f"not a minimum, product or maximum: {norms}")
         is_union = (word == "or") is not negated
-        result: list[tuple[Proposition, ...]] = [] if is_union else [()]
+        result: list[Way] = [] if is_union else [()]
         for part in inner:
             ways = self.ways(part, block, negated=negated)
             if is_union:
@@ -385,9 +357,7 @@ class Model:
                 raise UndecidedError("a condition that holds in too many ways")
         return result
 
-    def _ways_of_proposition(
-        self, one: Is, *, negated: bool
-    ) -> list[tuple[Proposition, ...]]:
+    def _ways_of_proposition(self, one: Is, *, negated: bool) -> list[Way]:
         hedges = one.hedges
         while hedges[:1] == ("not",):
             negated, hedges = not negated, hedges[1:]
@@ -435,8 +405,8 @@ def parts(condition: Condition | None) -> Iterator[Condition]:
         yield from parts(part)
 
 
-def _used(rules: Rules) -> set[tuple[str, str]]:
-    return {(c.variable, t) for rule in rules.rules for c in rule.when for t in c.terms}
+def _labels(rules: Iterable[Rule]) -> set[tuple[str, str]]:
+    return {(c.variable, t) for rule in rules for c in rule.when for t in c.terms}
 
 
 # --- the layout of a file
@@ -470,7 +440,7 @@ OPTIONAL = {
 }
 
 
-def once(names: Sequence[str]) -> None:
+def refuse_twice(names: Sequence[str]) -> None:
     """Refuse a name that stands twice.
 
     Raises:
@@ -493,32 +463,39 @@ def _places(items: Any) -> list[Place]:
     return items.places if isinstance(items, Items) else []
 
 
-def _variable(one: Facts) -> Variable:
-    keys(one, "name", "terms, unit, range, sum of, categories, missing as, numbers")
-    ends = one.get("range", {})
+def _variable(facts: Facts) -> Variable:
+    optional = "terms, unit, range, sum of, categories, missing as, numbers"
+    keys(facts, "name", optional)
+    ends = facts.get("range", {})
     if ends.keys() - {"from", "to", "outside"}:
         raise CannotRunError("a range with other ends")
-    low, high = (None if k not in ends else number_of(ends[k]) for k in ("from", "to"))
+    numbers = {k: number_of(ends[k]) for k in ("from", "to") if k in ends}
     inputs = [
         (
-            p["input"],
-            Fraction(number_of(p["weight"])),
-            Fraction(number_of(p.get("centre", 0))),
+            part["input"],
+            Fraction(number_of(part["weight"])),
+            Fraction(number_of(part.get("centre", 0))),
         )
-        for p in one.get("sum of", [])
+        for part in facts.get("sum of", [])
     ]
-    curves = _curves(one.get("terms", []))
-    unit, is_clipped = one.get("unit", ""), "outside" in ends
-    missing = Fraction(number_of(one["missing as"])) if "missing as" in one else None
-    names, parts = tuple(one.get("categories", ())), tuple(inputs)
-    rest = is_clipped, names, missing, one.get("numbers") == "whole"
-    return Variable(one["name"], curves, unit, low, high, parts, *rest)
+    return Variable(
+        facts["name"],
+        _curves(facts.get("terms", [])),
+        facts.get("unit", ""),
+        numbers.get("from"),
+        numbers.get("to"),
+        tuple(inputs),
+        "outside" in ends,
+        tuple(facts.get("categories", ())),
+        Fraction(number_of(facts["missing as"])) if "missing as" in facts else None,
+        facts.get("numbers") == "whole",
+    )
 
 
 def _curves(terms: Iterable[Facts]) -> dict[str, Curve]:
     terms = [{**one} for one in terms]
     names = [one.pop("name") for one in terms]
-    once(names)
+    refuse_twice(names)
     return dict(zip(names, map(curve_of, terms), strict=True))
 
 
