@@ -79,7 +79,7 @@ def average(values: Bounds, weights: Bounds) -> Bounds:
 def _least_average(values: FloatArray, weights: Bounds) -> FloatArray:
     values = np.broadcast_to(values, weights.low.shape)
     order = np.argsort(values, axis=0, kind="stable")
-    x, low, high = (np.take_along_axis(each, order, 0) for each in (values, *weights))
+    x, low, high = (np.take_along_axis(of, order, 0) for of in (values, *weights))
     with np.errstate(divide="ignore", invalid="ignore"):
         sums = _parted(high, low)
         averages = np.where(sums > 0.0, _parted(x * high, x * low) / sums, np.inf)
@@ -115,7 +115,7 @@ def largest(changes: Sequence[Change]) -> Change:
     Its slope is that of a number that may be larger than all others, or of the one
     that is surely as large as the rest.
     """
-    values, slopes = (stacked(each) for each in zip(*changes, strict=True))
+    values, slopes = (stacked(parts) for parts in zip(*changes, strict=True))
     low = values.low.max(0)
     may_be = values.high > low
     np.put_along_axis(may_be, values.low.argmax(0)[None], values=True, axis=0)

@@ -77,7 +77,7 @@ class OutputBounds:
 
     def __init__(self, base: Base, system: FuzzySystem, name: str) -> None:
         self.base, self.system = base, system
-        self.output = next(each for each in system.outputs if each.name == name)
+        self.output = next(of for of in system.outputs if of.name == name)
         self.is_weighted = self.output.defuzzifier.is_weighted
         self.is_sum = self.output.defuzzifier.method == "weighted sum"
         for obstacle in self._obstacles():
@@ -133,7 +133,8 @@ class OutputBounds:
         groups: dict[tuple[object, ...], _Group] = {}
         for number, place, block, conclusion in self._conclusions():
             term, is_product = self._term(conclusion), block.implication == "product"
-            ways = [k for k, one in enumerate(self.base.rules) if one.number == number]
+            rules = enumerate(self.base.rules)
+            ways = (k for k, rule in rules if rule.number == number)
             own = () if self.output.aggregation == "maximum" else (number, place)
             key = term.name, is_product, own
             if key not in groups:
@@ -155,6 +156,14 @@ class OutputBounds:
         if not np.isfinite(degrees).all():
             raise NotBoundedError(f"the curve of the term {term.name!r} is not bounded")
         return degrees[:, None]
+
+    def bounds(self, boxes: Boxes, name: str = "") -> Bounds:
+        """Return bounds of the output, or of its slope with an input, on each box.
+
+        Raises:
+            NotBoundedError: If the slope cannot be bounded.
+        """
+        return self.slopes(boxes, name) if name else self.numbers(boxes)
 
     # --- numbers
 
@@ -188,10 +197,8 @@ class OutputBounds:
             values = [self._value(boxes, group.term) for group in self.groups]
             return stacked(values), stacked(strengths)
         join = _JOINS[self.output.aggregation or "maximum"]
-        heights = (self._heights(strengths, side) for side in (0, 1))
-        return exact(self.samples), Bounds(
-            *(reduce(join, each) * self.shares for each in heights)
-        )
+        low, high = (reduce(join, self._heights(strengths, side)) for side in (0, 1))
+        return exact(self.samples), Bounds(low * self.shares, high * self.shares)
 
     def _heights(self, strengths: Sequence[Bounds], side: int) -> list[FloatArray]:
         pairs = zip(self.groups, strengths, strict=True)
@@ -237,15 +244,14 @@ class OutputBounds:
                 *(np.where(np.isinf(x), 0.0, x) for x in average(values, weights))
             )
             far = values.plus(y)
-        moves = [*self._moves(strengths, far)]
-        moved = stacked(
-            [move.times(one.slope) for move, one in zip(moves, changes, strict=True)]
-        ).total()
-        result = moved if self.is_sum else moved.over(weights.total())
+        moves = zip(self._moves(strengths, far), changes, strict=True)
+        result = stacked([move.times(change.slope) for move, change in moves]).total()
+        result = result if self.is_sum else result.over(weights.total())
         place = self.system.inputs.index(name)
         functions = [group.term.function for group in self.groups]
         own = [
-            one.weights[place] if isinstance(one, Linear) else 0.0 for one in functions
+            function.weights[place] if isinstance(function, Linear) else 0.0
+            for function in functions
         ]
         if any(own):
             result = result.plus(self._number(exact(np.array(own)[:, None]), weights))
@@ -297,9 +303,12 @@ def rule_change(boxes: Boxes, place: int, name: str) -> Change:
 
 def scale_of(system: FuzzySystem, name: str) -> float:
     """Return the largest number of an output, by which its rounding is judged."""
-    output = next(each for each in system.outputs if each.name == name)
-    inputs = [each for each in system.variables if not each.parts]
-    ends = [max(abs(each.low or 0.0), abs(each.high or 0.0)) for each in inputs]
+    output = next(of for of in system.outputs if of.name == name)
+    ends = [
+        max(abs(variable.low or 0.0), abs(variable.high or 0.0))
+        for variable in system.variables
+        if not variable.parts
+    ]
     sizes = [abs(output.low or 0.0), abs(output.high or 0.0)]
     for term in output.terms:
         match term.function:

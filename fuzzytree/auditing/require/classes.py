@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+import math
+from collections.abc import Callable, Collection, Sequence
 from fractions import Fraction
 
 import numpy as np
 
 from fuzzytree.auditing.decide import Question
+from fuzzytree.auditing.engine.domain import DomainSide
+from fuzzytree.auditing.engine.regions import (
+    EVERYWHERE,
+    Region,
+    Union,
+    common,
+    cut_side,
+    regions,
+)
 from fuzzytree.auditing.require.claims import OrderClaim
-from fuzzytree.auditing.require.leaves import pair_of_rows
 from fuzzytree.auditing.require.search import Outcome, Rows, Search
 from fuzzytree.auditing.require.tables import prediction_texts
 from fuzzytree.model import FloatArray, FuzzySystem, FuzzyTree, Linear
@@ -33,7 +43,7 @@ def class_outcome(search: Search, labels: Sequence[str | None]) -> Outcome:
     ]
     if not isinstance(model, FuzzyTree) and model.semantics.uncovered not in labels:
         questions.append(gap(range(len(rules))))
-    allowed = [k for k, one in enumerate((*model.classes, None)) if one in labels]
+    allowed = [k for k, label in enumerate((*model.classes, None)) if label in labels]
 
     def loss(rows: Rows) -> FloatArray:
         return np.where(np.isin(search.predict(rows)[0, 0], allowed), -1.0, 1.0)
@@ -67,7 +77,7 @@ def order_outcome(search: Search, claim: OrderClaim) -> Outcome:
     if isinstance(model, FuzzyTree):
         return _of_leaves(
             search,
-            (claim.input,),
+            [claim.input],
             lambda first, second: labels.index(first) > labels.index(second),
             rises=True,
         )
@@ -96,7 +106,7 @@ def unchanged_outcome(
     if pair is not None:
         return Outcome("REFUTED", "the rows differ in nothing else", pair)
     if isinstance(model, FuzzyTree):
-        return _of_leaves(search, columns, lambda one, two: one != two, rises=False)
+        return _of_leaves(search, columns, str.__ne__, rises=False)
     rest: set[int] = {*range(len(rules))}
     if isinstance(model, FuzzySystem):
         rest.clear()
@@ -120,24 +130,72 @@ def unchanged_outcome(
     )
 
 
+_IsWrong = Callable[[str, str], bool]  # of the classes of two rows
+
+
 def _of_leaves(
-    search: Search,
-    columns: tuple[str, ...],
-    is_wrong: Callable[[str, str], bool],
-    *,
-    rises: bool,
+    search: Search, changes: Collection[str], is_wrong: _IsWrong, *, rises: bool
 ) -> Outcome:
-    """Return whether the classes of no two leaves of a tree are wrong together."""
+    """Return whether the classes of no two leaves of a tree are wrong together.
+
+    A leaf is a product of unions of intervals, so two rows with the same values of all
+    other inputs can reach two leaves exactly if these share a value of each.
+    """
     tree = search.model
     assert isinstance(tree, FuzzyTree)
     tests = {node.variable for node in tree.nodes}
     for variable in tree.variables:
-        sums = {part.input for part in variable.parts} & {*columns}
+        sums = {part.input for part in variable.parts} & {*changes}
         if sums and variable.name in tests:
             return Outcome("OPEN", f"{variable.name!r} is a sum with {min(sums)!r}")
-    rows = pair_of_rows(tree, search.domain, columns, is_wrong, rises=rises)
-    if rows is None:
-        return Outcome("PROVED", f"no two of {len(tree.leaves)} leaves contradict it")
-    if is_wrong(*prediction_texts(tree, rows)):
-        return Outcome("REFUTED", "the rows differ in nothing else", rows)
-    return Outcome("OPEN", "two leaves contradict it, if sums of inputs are free")
+    for first, second in itertools.product(regions(tree), repeat=2):
+        if not is_wrong(first.label, second.label):
+            continue
+        rows = _rows_in(search, (first, second), changes, rises=rises)
+        if rows is not None and is_wrong(*prediction_texts(tree, rows)):
+            return Outcome("REFUTED", "the rows differ in nothing else", rows)
+        if rows is not None:
+            text = "two leaves contradict it, if sums of inputs are free"
+            return Outcome("OPEN", text)
+    return Outcome("PROVED", f"no two of {len(tree.leaves)} leaves contradict it")
+
+
+def _rows_in(
+    search: Search,
+    pair: tuple[Region, Region],
+    changes: Collection[str],
+    *,
+    rises: bool,
+) -> Rows | None:
+    """Return two rows in two regions that differ in some inputs; sums are free."""
+    free = DomainSide("", -math.inf, math.inf)
+    unions = [dict(region.sides) for region in pair]
+    columns: list[tuple[float, float]] = []
+    for variable in search.model.variables:
+        name = variable.name
+        side = search.domain.side(name) or free
+        first, second = (union.get(name, EVERYWHERE) for union in unions)
+        if name in changes:
+            starts, ends = _values(side, first), _values(side, second)
+        else:
+            starts = ends = _values(side, common(first, second))[-1:]
+        if not (starts and ends):
+            return None
+        start, end = min(starts), max(ends)
+        if rises and name in changes and start >= end:
+            return None
+        if not variable.parts:
+            columns.append((start, end))
+    return np.array(columns)[..., None]
+
+
+def _values(side: DomainSide, union: Union) -> list[float]:
+    """Return values of a side in a union, among them the least and the largest."""
+    result: list[float] = []
+    for part in (cut for interval in union if (cut := cut_side(side, interval))):
+        low = math.nextafter(part.low, math.inf) if part.is_open else part.low
+        result += [] if part.missing is None else [part.missing]
+        result += [low, part.high]
+        if not (part.values or part.is_whole) and math.isfinite(low + part.high):
+            result.append((low + part.high) / 2)
+    return result

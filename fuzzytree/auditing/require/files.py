@@ -53,15 +53,15 @@ def read_requirements(path: PathLike, model: Document) -> tuple[Requirement, ...
     root, mistakes = compose(read_bounded(path, _MOST_BYTES), str(path))
     record = bind(root, RequirementsFile, mistakes)
     results: list[Requirement] = []
-    for position, one in enumerate(record.requirements if record else ()):
+    for position, entry in enumerate(record.requirements if record else ()):
         node = find(root, ("requirements", position, "that"))
         try:
-            parsed = parse_requirement(one.that, model, one.where or "")
+            requirement = parse_requirement(entry.that, model, entry.where or "")
         except ValueError as error:
             mistakes.append((node.line, node.column, str(error)))
             continue
-        parsed = parsed._replace(name=one.name or "", why=one.why or "")
-        results.append(parsed._replace(line=node.line, column=node.column))
+        requirement = requirement._replace(name=entry.name or "", why=entry.why or "")
+        results.append(requirement._replace(line=node.line, column=node.column))
     if mistakes:
         raise report(str(path), mistakes)
     return tuple(results)

@@ -20,7 +20,7 @@ from fuzzytree.auditing.decide import (
 )
 from fuzzytree.auditing.require.claims import NumberClaim
 from fuzzytree.auditing.require.classes import gap
-from fuzzytree.auditing.require.search import Outcome, Rows, Search
+from fuzzytree.auditing.require.search import Loss, Outcome, Rows, Search
 from fuzzytree.model import BoolArray, FloatArray, FuzzySystem
 from fuzzytree.runtimes import run_system
 from fuzzytree.semantics import Status
@@ -42,11 +42,12 @@ def covered_outcome(search: Search, system: FuzzySystem) -> Outcome:
     rows = search.worst(loss)
     if rows is not None:
         return Outcome("REFUTED", "no rule fires", rows)
-    rules = [
-        OutputBounds(search.base, system, one.name).rules for one in system.outputs
+    questions = [
+        gap(OutputBounds(search.base, system, output.name).rules)
+        for output in system.outputs
     ]
     proof = "some rule fires everywhere"
-    return search.rule_out([*map(gap, rules)], "no rule fires", proof, loss)
+    return search.rule_out(questions, "no rule fires", proof, loss)
 
 
 def number_outcome(search: Search, system: FuzzySystem, claim: NumberClaim) -> Outcome:
@@ -55,40 +56,47 @@ def number_outcome(search: Search, system: FuzzySystem, claim: NumberClaim) -> O
     Both ends of a claim are moved outwards by what rounding may change.
     """
     place = [output.name for output in system.outputs].index(claim.output)
-    output, scale = system.outputs[place], scale_of(system, claim.output)
-    line, unit, of = 0, scale, "it"
-    if claim.input:
-        axis = search.base.inputs[claim.input]
-        unit = scale / (float(axis.high - axis.low) or 1.0)
-        line, of = search.model.inputs.index(claim.input), "its slope"
+    line = search.model.inputs.index(claim.input) if claim.input else None
+    allowed = ROUNDING * scale_of(system, claim.output)
 
     def loss(rows: Rows) -> FloatArray:
         y = search.predict(rows)[place]
-        far = np.ones(y.shape[1])
-        if claim.input:
-            y, far = y[1:] - y[:1], rows[line, 1] - rows[line, 0]
+        if line is None:
+            lost = np.maximum(claim.low - y[0], y[0] - claim.high) - allowed
+            return np.where(np.isnan(y[0]), np.inf, lost)
+        rise, far = y[1] - y[0], rows[line, 1] - rows[line, 0]
         with np.errstate(invalid="ignore"):  # infinite ends of rows that are equal
-            lost = np.maximum(claim.low * far - y[0], y[0] - claim.high * far)
-        lost -= ROUNDING * scale
-        if claim.input:
-            return np.where((far > 0.0) & np.isfinite(y[0]), lost, -1.0)
-        return np.where(np.isnan(y[0]), np.inf, lost)
-
-    def refuted(rows: Rows) -> Outcome:
-        first, *more = search.predict(rows)[place, :, 0].tolist()
-        text = f"it is {first:.6g}" if math.isfinite(first) else "no rule fires"
-        for second in more:
-            far = rows[line, 1, 0] - rows[line, 0, 0]
-            text = f"as {claim.input} rises by {far:.6g}, it changes by "
-            text += f"{second - first:.6g}"
-        return Outcome("REFUTED", text, rows)
+            lost = np.maximum(claim.low * far - rise, rise - claim.high * far)
+        return np.where((far > 0.0) & np.isfinite(rise), lost - allowed, -1.0)
 
     rows = search.worst(loss, [claim.input] if claim.input else ())
-    if rows is not None:
-        return refuted(rows)
-    bounds = OutputBounds(search.base.fine, system, output.name)
-    default = math.nan if output.clips or output.default is None else output.default
-    if claim.input or not claim.low <= default <= claim.high:
+    outcome = Outcome("REFUTED", "", rows)
+    if rows is None:
+        outcome = _proof(search, system, claim, loss)
+        rows = outcome.rows
+    if rows is None:
+        return outcome
+    first, *more = search.predict(rows)[place, :, 0].tolist()
+    text = f"it is {first:.6g}" if math.isfinite(first) else "no rule fires"
+    for second in more:
+        far = float(np.ptp(rows[line]))
+        text = f"as {claim.input} rises by {far:.6g}, it changes by "
+        text += f"{second - first:.6g}"
+    return outcome._replace(sentence=text)
+
+
+def _proof(
+    search: Search, system: FuzzySystem, claim: NumberClaim, loss: Loss
+) -> Outcome:
+    """Return what bounds on boxes prove, or the row of a box that refutes it."""
+    base, unit, of = search.base.fine, scale_of(system, claim.output), "it"
+    if claim.input:
+        axis = base.inputs[claim.input]
+        unit, of = unit / (float(axis.high - axis.low) or 1.0), "its slope"
+    bounds = OutputBounds(base, system, claim.output)
+    default = bounds.output.default
+    is_default = default is not None and claim.low <= default <= claim.high
+    if claim.input or bounds.output.clips or not is_default:
         row_loss = None if claim.input else loss
         outcome = search.rule_out([gap(bounds.rules)], "no rule fires", "", row_loss)
         if outcome.verdict != "PROVED":
@@ -98,35 +106,29 @@ def number_outcome(search: Search, system: FuzzySystem, claim: NumberClaim) -> O
         return not claim.input and loss(search.row(point))[0] > 0.0
 
     def prove(slack: float, steps: int) -> Answer:
-        slack += ROUNDING * unit
+        low, high = (
+            end + sign * (slack + ROUNDING * unit)
+            for end, sign in ((claim.low, -1), (claim.high, 1))
+        )
 
         def is_excluded(boxes: Boxes) -> BoolArray:
-            ends = (
-                bounds.slopes(boxes, claim.input)
-                if claim.input
-                else bounds.numbers(boxes)
-            )
-            is_high = ends.low >= claim.low - slack
-            return np.array(is_high & (ends.high <= claim.high + slack))
+            ends = bounds.bounds(boxes, claim.input)
+            return np.array((ends.low >= low) & (ends.high <= high))
 
         steps //= bounds.work
         with np.errstate(all="ignore"):
-            return search_boxes(
-                search.base.fine, is_excluded, accepts, Budget(2 * steps), steps
-            )
+            return search_boxes(base, is_excluded, accepts, Budget(2 * steps), steps)
 
     answer = prove(0.0, search.steps)
     if isinstance(answer, Point):
-        return refuted(search.row(answer.values))
+        return Outcome("REFUTED", "", search.row(answer.values))
     if isinstance(answer, Proved):
         where = "the whole domain" if answer.how == "1 boxes" else answer.how
         return Outcome("PROVED", f"bounds of {of} on {where}")
-    bound = None
-    if math.isinf(claim.low) or math.isinf(claim.high) or claim.low == -claim.high:
-        for share in _WEAKER:
-            if isinstance(prove(share * unit, search.steps // 8), Proved):
-                slack = share * unit
-                is_low = math.isinf(claim.high)
-                bound = claim.low - slack if is_low else claim.high + slack
-                break
-    return Outcome("OPEN", answer.why, bound=bound)
+    open_ends = [math.isinf(claim.low), math.isinf(claim.high)]
+    for share in _WEAKER if any(open_ends) or claim.low == -claim.high else ():
+        slack = share * unit
+        if isinstance(prove(slack, search.steps // 8), Proved):
+            bound = claim.low - slack if open_ends[1] else claim.high + slack
+            return Outcome("OPEN", answer.why, bound=bound)
+    return Outcome("OPEN", answer.why)

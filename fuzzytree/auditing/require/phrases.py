@@ -191,7 +191,9 @@ def _choice(text: str, noun: str, names: Collection[str]) -> str:
 
 
 def _input(text: str, model: Document) -> Variable:
-    inputs = {one.name: one for one in model.variables if not one.parts}
+    inputs = {
+        variable.name: variable for variable in model.variables if not variable.parts
+    }
     return inputs[_choice(text, "input", inputs)]
 
 
@@ -236,18 +238,20 @@ def _output_claim(match: re.Match[str], system: FuzzySystem) -> Claim:
     words = match.groupdict()
     if not words:
         return CoveredClaim()
-    output = _choice(words["output"], "output", [one.name for one in system.outputs])
+    outputs = [output.name for output in system.outputs]
+    output = _choice(words["output"], "output", outputs)
     name = _input(words["input"], system).name if "input" in words else ""
+    low, high = -math.inf, math.inf
     if "slope" in words:
-        slope = _number(words["slope"])
-        if slope < 0.0:
+        high = _number(words["slope"])
+        low = -high
+        if high < 0.0:
             text = f"the largest change must be 0 or more, not {words['slope']}"
             raise ValueError(text)
-        return NumberClaim(output, -slope, slope, name)
-    if "low" in words:
-        ends = _ordered(_number(words["low"]), _number(words["high"]), match)
-        return NumberClaim(output, *ends)
-    end = _number(words.get("end", "0"))
-    if words["way"] in ("least", "rises"):
-        return NumberClaim(output, low=end, input=name)
-    return NumberClaim(output, high=end, input=name)
+    elif "low" in words:
+        low, high = _ordered(_number(words["low"]), _number(words["high"]), match)
+    elif words["way"] in ("least", "rises"):
+        low = _number(words.get("end", "0"))
+    else:
+        high = _number(words.get("end", "0"))
+    return NumberClaim(output, low, high, name)

@@ -66,11 +66,12 @@ def comply(
     if steps < 1:
         raise ValueError(f"the budget must be 1 step or more, not {steps}")
     boxes = [
-        [_part(model, domain, each, box) for box in each.boxes] for each in requirements
+        [_part(model, domain, requirement, box) for box in requirement.boxes]
+        for requirement in requirements
     ]
     answers = tuple(
-        _answer(model, each, parts, steps)
-        for each, parts in zip(requirements, boxes, strict=True)
+        _answer(model, requirement, parts, steps)
+        for requirement, parts in zip(requirements, boxes, strict=True)
     )
     title = title or model.name
     return Compliance(version(), title, fingerprint(model), source, steps, answers)
@@ -112,10 +113,11 @@ def _outcome(model: Document, claim: Claim, domain: Domain, steps: int) -> Outco
     search = Search(model, domain, steps)
     try:
         if isinstance(claim, UnchangedClaim):
-            allowed = [0.5]  # of the position of a class
+            scales = [0.5]  # of the position of a class
             if isinstance(model, FuzzySystem):
-                allowed = [ROUNDING * scale_of(model, o.name) for o in model.outputs]
-            return unchanged_outcome(search, claim.columns, np.array(allowed))
+                scales = [scale_of(model, output.name) for output in model.outputs]
+            allowed = ROUNDING * np.array(scales)
+            return unchanged_outcome(search, claim.columns, allowed)
         match claim, model:
             case ClassClaim(labels=labels), _:
                 return class_outcome(search, labels)

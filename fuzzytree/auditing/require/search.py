@@ -94,12 +94,13 @@ class Search:
 
     def predict(self, rows: Rows) -> FloatArray:
         """Return the results of tries, of shape (results, 1 or 2, tries)."""
-        results = self.run(rows.reshape(len(rows), -1))
+        results = self.run(rows.reshape(len(rows), math.prod(rows.shape[1:])))
         return results.reshape(-1, *rows.shape[1:])
 
     def row(self, point: Mapping[str, Fraction]) -> Rows:
         """Return the row of doubles nearest to a point, as the only try."""
-        return np.array([[[float(point[name])]] for name in self.model.inputs])
+        values = [float(point[name]) for name in self.model.inputs]
+        return np.array(values).reshape(-1, 1, 1)
 
     def worst(self, loss: Loss, changes: Collection[str] = ()) -> Rows | None:
         """Return the try that refutes a claim most, None if none does.
@@ -111,8 +112,8 @@ class Search:
         """
         random = np.random.default_rng(0)
         places = [self.model.inputs.index(name) for name in changes]
-        drawn = np.array([[[float(x) for x in one]] for one in self.base.samples])
-        rows = drawn.repeat(1 + bool(places), axis=1)
+        rows = np.array([[[*map(float, line)]] for line in self.base.samples])
+        rows = rows.repeat(1 + bool(places), axis=1)
         for place in places:
             rows[place, 1] = random.permutation(rows[place, 1])
         best, most = rows[..., :1], -math.inf
@@ -172,11 +173,11 @@ def predictor(model: Document) -> Callable[[FloatArray], FloatArray]:
         system = run_system(model)
         return lambda rows: system(rows).outputs
     run = baseline().load(model)
-    labels = (
-        [leaf.label for leaf in model.leaves]
-        if isinstance(model, FuzzyTree)
-        else [rule.then for rule in model.rules]
-    )
+    labels = [model.semantics.uncovered]
+    if isinstance(model, FuzzyTree):
+        labels += [leaf.label for leaf in model.leaves]
+    else:
+        labels += [rule.then for rule in model.rules]
     places = [*model.classes, None]
-    codes = [float(places.index(one)) for one in (model.semantics.uncovered, *labels)]
-    return lambda rows: np.array(codes)[run(rows).rule][None]
+    codes = np.array([float(places.index(label)) for label in labels])
+    return lambda rows: codes[run(rows).rule][None]
