@@ -232,6 +232,13 @@ class Boxes:
         self.places = {name: n for n, name in enumerate(stretches)}
         self._degrees: dict[Factor, tuple[FloatArray, FloatArray]] = {}
 
+    @classmethod
+    def whole(cls, base: Base) -> Boxes:
+        """Return the whole domain as the only box, but for stand-ins beside ranges."""
+        stretches = {axis.name: Stretches(axis) for axis in base.used}
+        high = np.array([[float(each.last) for each in stretches.values()]])
+        return cls(base, stretches, np.zeros_like(high), high)
+
     def degree(self, name: str, literal: Literal) -> tuple[FloatArray, FloatArray]:
         """Return bounds of a literal's degrees on each box."""
         key = name, literal
@@ -298,9 +305,8 @@ def search_boxes(
     if base.is_coupled or any(axis.extra for axis in base.used):
         return Open("axes share inputs, or have a value beside their range")
     own = Budget(steps, budget)
-    stretches = {axis.name: Stretches(axis) for axis in base.used}
-    ends = [[0.0] * len(stretches), [float(s.last) for s in stretches.values()]]
-    boxes = np.array([ends])
+    whole = Boxes.whole(base)
+    stretches, boxes = whole.stretches, np.stack([whole.low, whole.high], axis=1)
     seen = slivers = 0
     while len(boxes):
         try:

@@ -25,6 +25,7 @@ from fuzzytree.auditing.decide.bounds import (
     stacked,
 )
 from fuzzytree.auditing.decide.boxes import Boxes
+from fuzzytree.auditing.decide.rules import rules_of
 from fuzzytree.model import (
     Conclusion,
     FloatArray,
@@ -64,7 +65,13 @@ class _Group(NamedTuple):
 
 
 class OutputBounds:
-    """How an output follows from the strengths of rules.
+    """How an output of a system follows from the strengths of rules.
+
+    Args:
+        base: Rules of the system.
+        system: The system.
+        name: The output.
+        model: The place of the system, where the base has rules of two.
 
     Attributes:
         output: The output.
@@ -75,7 +82,9 @@ class OutputBounds:
         NotBoundedError: If it cannot be bounded.
     """
 
-    def __init__(self, base: Base, system: FuzzySystem, name: str) -> None:
+    def __init__(
+        self, base: Base, system: FuzzySystem, name: str, *, model: int = 0
+    ) -> None:
         self.base, self.system = base, system
         self.output = next(of for of in system.outputs if of.name == name)
         self.is_weighted = self.output.defuzzifier.is_weighted
@@ -87,7 +96,7 @@ class OutputBounds:
         self.shares = np.ones(self.samples.shape)
         if self.output.defuzzifier.grid == "half ends":
             self.shares[[0, -1]] = 0.5
-        self.groups = [*self._groups()]
+        self.groups = [*self._groups(model)]
         if not self.groups:
             raise NotBoundedError(f"no rule concludes {name!r}")
         self.rules = tuple({k: 0 for group in self.groups for k in group.rules})
@@ -109,7 +118,7 @@ class OutputBounds:
             yield f"the {how.method} ({how.grid}) of output {name!r}"
         if self.output.aggregation not in joins:
             yield f"the aggregation {self.output.aggregation} of {name!r}"
-        lost = {rule.number: rule for rule in self.base.left_out}
+        lost = {rule.number: rule for rule in rules_of(self.system).left_out}
         for number, _, block, conclusion in self._conclusions():
             if number in lost:
                 yield f"{lost[number].name} ({lost[number].reason})"
@@ -128,13 +137,13 @@ class OutputBounds:
         terms = self.output.terms
         return next(term for term in terms if term.name == conclusion.term)
 
-    def _groups(self) -> Iterator[_Group]:
+    def _groups(self, model: int) -> Iterator[_Group]:
         """Yield the conclusions: by the maximum, those of a term count once."""
         groups: dict[tuple[object, ...], _Group] = {}
         for number, place, block, conclusion in self._conclusions():
             term, is_product = self._term(conclusion), block.implication == "product"
             rules = enumerate(self.base.rules)
-            ways = (k for k, rule in rules if rule.number == number)
+            ways = (k for k, of in rules if (of.number, of.model) == (number, model))
             own = () if self.output.aggregation == "maximum" else (number, place)
             key = term.name, is_product, own
             if key not in groups:
@@ -156,14 +165,6 @@ class OutputBounds:
         if not np.isfinite(degrees).all():
             raise NotBoundedError(f"the curve of the term {term.name!r} is not bounded")
         return degrees[:, None]
-
-    def bounds(self, boxes: Boxes, name: str = "") -> Bounds:
-        """Return bounds of the output, or of its slope with an input, on each box.
-
-        Raises:
-            NotBoundedError: If the slope cannot be bounded.
-        """
-        return self.slopes(boxes, name) if name else self.numbers(boxes)
 
     # --- numbers
 

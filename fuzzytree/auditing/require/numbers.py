@@ -112,7 +112,8 @@ def _proof(
         )
 
         def is_excluded(boxes: Boxes) -> BoolArray:
-            ends = bounds.bounds(boxes, claim.input)
+            name = claim.input
+            ends = bounds.slopes(boxes, name) if name else bounds.numbers(boxes)
             return np.array((ends.low >= low) & (ends.high <= high))
 
         steps //= bounds.work

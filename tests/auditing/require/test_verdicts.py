@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 import fuzzytree as ft
+from fuzzytree.auditing.decide import Base, Boxes, OutputBounds
+from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.model import (
     Band,
     Conclusion,
@@ -151,3 +153,15 @@ def test_a_smaller_budget_opens_what_a_larger_one_decides() -> None:
     assert answer.verdict == "OPEN"
     (again,) = ft.require(system, [text], steps=1000).answers
     assert answer == again
+
+
+def test_outputs_of_two_systems_are_bounded_on_the_same_boxes() -> None:
+    old, new = heater(), heater("centroid")
+    base = Base.of_both(old, new, domain_of(old)).fine
+    boxes = Boxes.whole(base)
+    ends = [
+        OutputBounds(base, system, "heat", model=place).numbers(boxes)
+        for place, system in enumerate((old, new))
+    ]
+    assert [round(float(end[0]), 6) for end in ends[0]] == [10.0, 30.0]
+    assert ends[1].low[0] <= 10.0 < 30.0 <= ends[1].high[0]
