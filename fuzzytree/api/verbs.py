@@ -573,7 +573,7 @@ def audit(
         row=row or None,
         selection=selection,
         settings=chosen,
-        clock=auditing.Clock(chosen.budget_s, report=progress),
+        report=progress,
         repeat=repeat,
     )
 
@@ -769,7 +769,7 @@ def diff(
         second,
         domain=auditing.joined_domain(first, second, limits or {}, rows),
         rows=rows,
-        settings=settings or auditing.AuditSettings(budget_s=budget),
+        settings=settings or auditing.AuditSettings(budget=budget),
         budget=auditing.Budget(int(min(budget, 1e9) * 1e6)),
         report=progress or auditing.silent,
         files=(files[0], files[1]),

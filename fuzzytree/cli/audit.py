@@ -86,8 +86,8 @@ class AuditOptions(TableOptions, FullResultOptions):
     )
     skip: tuple[str, ...] = several("--skip CODES", "Codes to leave out, such as FT5.")
     budget: float | None = option(
-        "--budget SECONDS",
-        "Time limit of the audit in seconds; 60 by default.",
+        "--budget STEPS",
+        "Limit of the proofs in million steps, each about a second; 60 by default.",
         type=float,
     )
     settings: tuple[str, ...] = several(

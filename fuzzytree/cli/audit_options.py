@@ -88,7 +88,7 @@ def settings_of(
     values = dict(setting(text, "--setting") for text in texts)
     found = settings_with(known.audit_settings, values)
     if budget is not None:
-        found = msgspec.structs.replace(found, budget_s=budget)
+        found = msgspec.structs.replace(found, budget=budget)
         check_settings(found)
     return found
 

@@ -88,7 +88,7 @@ def check_head(audit: Audit, case: Case, report: Report) -> None:
         expect(is_share, f"the setting {name} is not in (0, 1]")
     expect(1 <= settings.rows <= 10**7, "the setting rows is not in 1 to 10,000,000")
     expect(0 <= settings.seed < 2**32, "the setting seed is not in 0 to 2**32 - 1")
-    expect(0 < settings.budget_s <= 1e9, "the budget is not in (0, 1e9] seconds")
+    expect(0 < settings.budget <= 1e9, "the budget is not in (0, 1e9] million steps")
     _domain(audit, case, report)
     ids = {answer.id for answer in audit.answers if answer.is_finding}
     findings = sorted(ids.intersection(audit.accepted))
@@ -279,17 +279,11 @@ def _words(case: Case, answer: Answer) -> None:
     require(answer.subject in subjects, f"it is of {subjects[0]}")
     others = answer.message in ("FT104.others", "FT105.others", "FT106.others")
     listed = sum(o.is_finding for o in case.coded(answer.code)) if others else 0
-    later = answer.rules[:1] if answer.message == "FT103.superfluous" else ()
-    count = sum(n > first for first in later for n in case.rivals(first))
     require(
         not others or bool(listed) == ("listed" in answer.facts),
         "whether others are listed",
     )
-    require(
-        not later or bool(count) == ("later" in answer.facts),
-        "whether later rules are of another class",
-    )
-    facts = _facts(case, answer) | {"listed": listed, "later": count}
+    facts = _facts(case, answer) | {"listed": listed}
     for name, fact in answer.facts.items():
         is_so = name not in facts or facts[name] == fact
         require(is_so, f"{name}: it is {facts.get(name)!r}")
@@ -330,7 +324,7 @@ def _facts(case: Case, answer: Answer) -> dict[str, Any]:
     if code in ("FT104", "FT105"):
         for n in answer.rules[1:2]:
             facts |= {"then": case.then(n), "by": case.name(n)}
-    else:
+    elif code != "FT103":
         facts |= dict(zip(("then", "other"), thens, strict=False))
     if code == "FT203":
         facts.pop("other", None)

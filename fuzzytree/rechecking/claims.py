@@ -73,8 +73,6 @@ def never_wins(case: Case, answer: Answer) -> Statements:
     """Claim that rivals, those that the proof names or all, are nowhere weaker."""
     (number,) = answer.rules
     rivals = case.rivals(number)
-    if answer.code == "FT103":
-        rivals = [n for n in case.numbers if n != number]
     if isinstance(answer.state, Proved) and answer.state.rivals:
         require({*answer.state.rivals} <= {*rivals}, "a rival that is none")
         rivals = [*answer.state.rivals]
@@ -225,23 +223,39 @@ def without(case: Case, answer: Answer) -> Rule:
 
 
 def irrelevant(case: Case, answer: Answer) -> Statements:
-    """Claim that a rule without a proposition takes no input from another class.
-
-    First apart from exact ties; then also where rules tie.
-    """
+    """Claim that a rule without a proposition takes no input from another class."""
     (number,) = answer.rules
     name = f"{case.name(number)} without {answer.facts['proposition']}"
     symbols = [*map(case.symbol, case.numbers)]
     rest = case.script.add_rule(name, without(case, answer), case.rules)
     others = [*symbols[: number - 1], rest, *symbols[number:]]
-    bare = all_of(f"(<= {own} 0.0)" for own in symbols)
-    text = f"{name} decides the same"
+    yield from _unchanged(case, number, others, symbols, name)
+
+
+def superfluous(case: Case, answer: Answer) -> Statements:
+    """Claim that no input has another class without a rule."""
+    (number,) = answer.rules
+    symbols = [*map(case.symbol, case.numbers)]
+    others = [*symbols[: number - 1], "0.0", *symbols[number:]]
+    name = f"a model without {case.name(number)}"
+    yield from _unchanged(case, number, symbols, others, name)
+
+
+def _unchanged(
+    case: Case, number: int, own: list[str], others: list[str], name: str
+) -> Statements:
+    """Claim that where a rule decides by some strengths, its class does by others.
+
+    First apart from exact ties; then also where rules tie.
+    """
+    bare = all_of(f"(<= {strength} 0.0)" for strength in others)
     for is_strict in (True, False):
-        ways = [case.wins(n, symbols, is_strict=is_strict) for n in case.rivals(number)]
+        ways = [case.wins(n, others, is_strict=is_strict) for n in case.rivals(number)]
         ways += [bare] * (case.rules.uncovered != case.then(number))
-        formula = all_of([case.wins(number, others, is_strict=is_strict), any_of(ways)])
+        formula = all_of([case.wins(number, own, is_strict=is_strict), any_of(ways)])
         tail = ", apart from exact ties" if is_strict else ""
-        yield Statement(text + tail, formula, is_sure=is_strict)
+        text = f"{name} decides the same{tail}"
+        yield Statement(text, formula, is_sure=is_strict)
 
 
 def apart(case: Case, answer: Answer) -> Statements:
@@ -421,7 +435,7 @@ def _count(answer: Answer, name: str, count: int) -> None:
 
 Claims = Callable[[Case, Answer], Statements]
 _MESSAGES: dict[Claims, str] = {
-    never_wins: "FT101.never-wins FT101.may-decide-by-place FT103.superfluous",
+    never_wins: "FT101.never-wins FT101.may-decide-by-place",
     never_fires: "FT101.never-fires FT107.silent",
     silent: "FT101.weight-0 FT101.never-true",
     live_leaves: "FT101.leaves",
@@ -430,6 +444,7 @@ _MESSAGES: dict[Claims, str] = {
     no_other_hidden: "FT104.others FT105.others",
     same: "FT106.same FT106.contradiction FT106.different",
     no_others_same: "FT106.others",
+    superfluous: "FT103.superfluous",
     irrelevant: "FT107.irrelevant",
     apart: "FT201.never FT201.unlisted",
     same_class: "FT204.alike",

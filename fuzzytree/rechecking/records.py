@@ -177,7 +177,7 @@ class Settings(NamedTuple):
     overlap: float
     rows: int
     seed: int
-    budget_s: float
+    budget: float
 
 
 class Source(NamedTuple):

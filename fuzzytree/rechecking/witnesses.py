@@ -60,8 +60,6 @@ def _of_kind(state: Witness, kind: str) -> list[Claim]:
 def _shows_win(case: Case, answer: Answer, state: Witness) -> None:
     (number,), claims = answer.rules, _of_kind(state, "beats")
     rivals = {*case.rivals(number)}
-    if answer.code == "FT103":
-        rivals = {*case.numbers} - {number}
     if answer.message == "FT101.fires":
         rivals = set()
     is_all = any((c.rules, {*c.rivals}) == ((number,), rivals) for c in claims)
@@ -90,11 +88,16 @@ def _shows_tie(case: Case, answer: Answer, state: Witness) -> None:
 def _shows_need(case: Case, answer: Answer, state: Witness) -> None:
     point, place = case.point_of(state.point), answer.rules[0] - 1
     every = [*case.rules.rules]
-    every[place] = without(case, answer)
+    if answer.code == "FT107":
+        every[place] = without(case, answer)
+    else:
+        del every[place]
     before = class_at(case.rules, point)
     after = class_at(case.rules._replace(rules=tuple(every)), point)
-    require(before != after == case.then(place + 1), "it does not matter there")
+    own = after if answer.code == "FT107" else before
+    require(before != after and own == case.then(place + 1), "it does not matter there")
     require(answer.facts.get("before") == before, f"the class there is {before!r}")
+    require(answer.facts.get("then") == after, f"it becomes {after!r}")
 
 
 def _shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
@@ -156,9 +159,9 @@ def _shows_gap(case: Case, answer: Answer, state: Witness) -> None:
 
 
 _MESSAGES: dict[Callable[[Case, Answer, Witness], None], str] = {
-    _shows_win: "FT101.wins FT101.fires FT102.leads FT103.alone",
-    _shows_tie: "FT101.decides-by-place FT103.by-place FT202.tie",
-    _shows_need: "FT107.needed",
+    _shows_win: "FT101.wins FT101.fires FT102.leads",
+    _shows_tie: "FT101.decides-by-place FT202.tie",
+    _shows_need: "FT103.needed FT107.needed",
     _shows_conflict: "FT201.conflict",
     _shows_difference: "FT203.differs",
     _shows_region: "FT205.region",

@@ -198,7 +198,7 @@ def asked_text(audit: Audit) -> str:
     if audit.was_interrupted:
         return "interrupted: what is proved is kept, the rest is not examined"
     if not audit.is_complete:
-        return "incomplete: the budget is spent (--budget SECONDS)"
+        return "incomplete: the budget is spent (--budget STEPS)"
     if not audit.answers:
         return "no question applies to this model"
     states = known_as(audit.answers)

@@ -33,7 +33,7 @@ CORPORA = (FCL, FIS, FLL)
 LEFT_OUT = ("FT6", "FT7")
 """Codes that need rows or runtimes: docs/reference/corpus.md compares engines."""
 
-SETTINGS = AuditSettings(budget_s=600.0)
+SETTINGS = AuditSettings(budget=600.0)
 
 INTRODUCTION = """\
 # Audits of real rule bases

@@ -46,7 +46,7 @@ def test_audits_of_real_files_hold_and_their_numbers_cannot_be_edited(
         file = model_file("m.yaml", content.content)
         found = audit(
             Material(model, file=file),
-            settings=AuditSettings(budget_s=3.0),
+            settings=AuditSettings(budget=3.0),
             selection=AuditSelection(skip=LEFT_OUT),
         )
         text = msgspec.json.encode(found)

@@ -61,7 +61,7 @@ def test_alone_in_an_empty_folder_it_checks_a_real_audit(tmp_path: Path) -> None
     reported = "\n".join(recheck_files(*names).lines()) + "\n"
     assert (ran.returncode, ran.stderr) == (2, "")
     verdict, *_, advice = ran.stdout.splitlines()
-    assert verdict.endswith("checked again; 3 answers PROVED are unconfirmed")
+    assert verdict.endswith("checked again; 4 answers PROVED are unconfirmed")
     assert advice.startswith("no solver is at hand: install fuzzytree-toolkit[proofs]")
     assert "answers PROVED, confirmed by z3" in reported
 

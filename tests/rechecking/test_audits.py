@@ -56,7 +56,7 @@ HERE = {
 
 FREE = {
     r"version|fingerprint|rows|data\..*|file\.name|file": "its truth is elsewhere",
-    r"settings\.(budget_s|seed|rows|epsilon|margin|lead|level|overlap)": "all is true "
+    r"settings\.(budget|seed|rows|epsilon|margin|lead|level|overlap)": "all is true "
     "with another value as well",
     r"domain\.sides\.(low|high|origin)": "all is true on another domain as well",
     r"unasked": "why something is left out, in words",

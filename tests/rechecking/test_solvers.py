@@ -222,7 +222,7 @@ def test_without_a_solver_proofs_stay_and_are_counted(
     assert {state.confirmed for state in states} == {"", "recheck"}
     report = recheck(msgspec.json.encode(result), content, NAMES)
     assert (report.wrong, report.exit_code) == ([], 2)
-    assert report.unconfirmed == 3
+    assert report.unconfirmed == 4
 
 
 @pytest.mark.parametrize(

@@ -184,7 +184,7 @@ def test_the_verdict_counts_and_says_what_next() -> None:
     audit = every_state()
     assert audit_verdict(audit, ["FT101-0"]) == (
         "2 findings: 1 error, 1 warning beside 1 accepted; incomplete: the budget is "
-        "spent (--budget SECONDS); 1 accepted finding no longer found, which "
+        "spent (--budget STEPS); 1 accepted finding no longer found, which "
         "--write-baseline forgets; 1 PROVED, none confirmed; `fuzzytree explain FT101` "
         "explains the gravest"
     )

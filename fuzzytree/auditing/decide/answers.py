@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+
+_LOOK = 1_000  # steps between two looks at a budget
+
 ZERO, ONE = Fraction(0), Fraction(1)
 
-STEPS = 20_000_000
+Progress = Callable[[str, float], None]
+
+STEPS = 60_000_000
 """The budget of a whole audit, unless the user gives another one."""
 
 
@@ -32,9 +38,15 @@ class Point(NamedTuple):
 
 
 class Open(NamedTuple):
-    """It is not known; `why` says what was tried."""
+    """It is not known.
+
+    Attributes:
+        why: What was tried.
+        code: The reason, as a code of the audit.
+    """
 
     why: str
+    code: str = "FTD05"
 
 
 Answer = Proved | Point | Open
@@ -73,14 +85,20 @@ class Question(NamedTuple):
         return self.reach + self.rivals + self.weak
 
 
-class OutOfStepsError(Exception):
+class OutOfStepsError(OutOfTimeError):
     """The budget is spent; what was decided before remains valid."""
 
 
-class Budget:
+class Budget(Clock):
     """How many steps may still be taken: the same answers on any machine and load.
 
     A step is about a microsecond of work.
+
+    Args:
+        steps: How many.
+        whole: The budget that it is a part of.
+        report: Called with what is done now, and with the share of all work that is
+            done, in [0, 1].
 
     Example:
         >>> budget = Budget(100)
@@ -88,8 +106,14 @@ class Budget:
         50
     """
 
-    def __init__(self, steps: int = STEPS, whole: Budget | None = None) -> None:
+    def __init__(
+        self,
+        steps: int = STEPS,
+        whole: Budget | None = None,
+        report: Progress | None = None,
+    ) -> None:
         self.left, self.whole = steps, whole
+        self._report = report
 
     def spend(self, steps: int) -> None:
         """Take some steps.
@@ -103,9 +127,31 @@ class Budget:
         if self.left < 0:
             raise OutOfStepsError
 
-    def share(self, part: float) -> Budget:
+    def share(self, part: float, *, report: Progress | None = None) -> Budget:
         """Return a budget of a part of the steps that are left, which spends both."""
-        return Budget(max(int(self.left * part), 0), self)
+        return Budget(max(int(self.left * part), 0), self, report)
+
+    def report(self, text: str, share: float) -> None:
+        """Report what is done now, and the share of the work that is done."""
+        if self._report is not None:
+            self._report(text, share)
+
+    def check(self) -> None:
+        """Spend the steps of a part of some work."""
+        self.spend(_LOOK)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no step is left, after those of the work between two looks."""
+        self.left -= _LOOK
+        if self.whole is not None:
+            self.whole.left -= _LOOK
+        return self.is_spent
+
+    @property
+    def left_s(self) -> float:
+        """About how many seconds are left."""
+        return self.left / 1e6
 
     @property
     def is_spent(self) -> bool:

@@ -95,6 +95,7 @@ class Axis:
         self.extra: tuple[Fraction, ...] = ()
         self.literals: dict[Literal, int] = {}
         self.most_pieces = MOST_PIECES
+        self.kept: dict[Literal, tuple[list[Lines], list[Lines]]] = {}
         self._tables: dict[int, list[Cell]] = {}
         self._restricted: dict[frozenset[Literal], Axis] = {}
 
@@ -152,6 +153,9 @@ class Axis:
         """
         result: dict[Literal, tuple[list[Lines], list[Lines]]] = {}
         for literal in self.literals:
+            if literal in self.kept:
+                result[literal] = self.kept[literal]
+                continue
             lower: list[Lines] = []
             upper: list[Lines] = []
             for function in literal.functions:
@@ -159,11 +163,10 @@ class Axis:
                 both = _coarser(both, self.most_pieces)
                 if literal.negated:
                     both = both.negated()
-                low = _scaled(both.lower, literal.scale)
+                low = _moved(both.lower, literal)
                 lower.append(low)
-                high = low if both.is_exact else _scaled(both.upper, literal.scale)
-                upper.append(high)
-            result[literal] = lower, upper
+                upper.append(low if both.is_exact else _moved(both.upper, literal))
+            result[literal] = self.kept[literal] = lower, upper
         return result
 
     @cached_property
@@ -456,7 +459,8 @@ def literal_bounds(literal: Literal, x: Fraction) -> tuple[Fraction, Fraction]:
     low, high = max(one[0] for one in every), max(one[1] for one in every)
     if literal.negated:
         low, high = 1 - high, 1 - low
-    return literal.scale * low, literal.scale * high
+    by = literal.lowered
+    return literal.scale * low - by, literal.scale * high - by
 
 
 def value_at(lines: Lines, x: Fraction) -> Fraction:
@@ -472,6 +476,14 @@ def _scaled(lines: Lines, by: Fraction) -> Lines:
     if by == ONE:
         return lines
     parts = (tuple(v * by for v in of) for of in lines[1:])
+    return Lines(lines.x, *parts)
+
+
+def _moved(lines: Lines, literal: Literal) -> Lines:
+    lines = _scaled(lines, literal.scale)
+    if not literal.lowered:
+        return lines
+    parts = (tuple(v - literal.lowered for v in of) for of in lines[1:])
     return Lines(lines.x, *parts)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
@@ -24,8 +25,6 @@ from fuzzytree.model import BoolArray, Document, FloatArray, FuzzySystem, Variab
 
 SAMPLES = 4096
 """Points that are drawn, which find most of what there is to find."""
-
-_GRID = 1 << 20  # drawn numbers are multiples of a range by this
 
 
 class Base:
@@ -127,7 +126,12 @@ class Base:
     def with_rules(self, more: Iterable[BaseRule]) -> Base:
         """Return the same with further rules behind."""
         rules = (*self.rules, *more)
-        return Base(rules, self.variables, self.domain, seed=self.seed)
+        result = Base(rules, self.variables, self.domain, seed=self.seed)
+        for name, axis in self.axes.items():
+            if name in result.axes:
+                result.axes[name].kept = axis.kept
+        vars(result)["samples"] = self.samples
+        return result
 
     def on(self, domain: Domain) -> Base:
         """Return the same rules on another domain."""
@@ -251,7 +255,7 @@ class Base:
                     least, most = least * a, most * b
                 else:
                     least, most = min(least, a), min(most, b)
-                if not most:
+                if most <= 0:
                     break
             low[place], high[place] = least, most
         return low, high
@@ -287,72 +291,77 @@ class Base:
     # --- doubles: points that are drawn, which find most witnesses
 
     @cached_property
-    def samples(self) -> list[list[Fraction]]:
+    def samples(self) -> list[FloatArray]:
         """Values of each input at points that rows can have; half of them at knots."""
         chance = np.random.default_rng(self.seed)
-        columns: list[list[Fraction]] = []
+        columns: list[FloatArray] = []
         for name, axis in self.inputs.items():
             if axis.values:
-                picks = chance.integers(len(axis.values), size=SAMPLES)
-                columns.append([axis.values[n] for n in picks])
+                values = np.array([float(v) for v in axis.values])
+                columns.append(chance.choice(values, size=SAMPLES))
                 continue
-            share = chance.integers(_GRID, size=SAMPLES, endpoint=True)
-            width = axis.high - axis.low
-            drawn = [axis.low + width * Fraction(int(n), _GRID) for n in share]
+            drawn = _drawn(axis, chance)
             places = self._places(name, axis)
-            if places:
-                picks = chance.integers(len(places), size=SAMPLES)
+            if len(places):
                 is_drawn = chance.random(SAMPLES) < 0.5
-                pairs = zip(drawn, picks, is_drawn, strict=True)
-                drawn = [x if keep else places[n] for x, n, keep in pairs]
+                drawn = np.where(is_drawn, drawn, chance.choice(places, size=SAMPLES))
             if axis.is_whole:
-                drawn = [Fraction(round(x)) for x in drawn]
-            columns.append([x if axis.contains(x) else axis.high for x in drawn])
+                near = np.clip(np.round(drawn), math.ceil(axis.low), float(axis.high))
+                extra = [float(x) for x in axis.extra]
+                drawn = np.where(np.isin(drawn, extra), drawn, near)
+            if axis.is_open:
+                drawn = np.where(drawn <= float(axis.low), float(axis.high), drawn)
+            columns.append(drawn)
         return columns
 
-    def _places(self, name: str, axis: Axis) -> list[Fraction]:
-        own = self.axes.get(name)
+    def _places(self, name: str, axis: Axis) -> FloatArray:
+        own, extra = self.axes.get(name), [float(x) for x in axis.extra]
         if own is None or not own.literals:
-            return [*axis.extra]
-        knots = [x for x in own.bends if axis.low <= x <= axis.high][:400]
+            return np.array(extra)
+        knots = [float(x) for x in own.bends if axis.low <= x <= axis.high][:400]
         middles = [(a + b) / 2 for a, b in itertools.pairwise(knots)]
-        return [*knots, *middles, *axis.extra]
+        return np.array([*knots, *middles, *extra])
 
     def sample(self, number: int) -> dict[str, Fraction]:
         """Return a sampled point, by its number."""
         columns = zip(self.inputs, self.samples, strict=True)
-        return {name: column[number] for name, column in columns}
+        return {name: Fraction(float(column[number])) for name, column in columns}
 
     @cached_property
     def sampled(self) -> FloatArray:
         """The strengths at sampled points in doubles, shape (rules, points)."""
-        columns = {
-            name: np.array([float(x) for x in column])
-            for name, column in zip(self.inputs, self.samples, strict=True)
-        }
+        columns = dict(zip(self.inputs, self.samples, strict=True))
+        result = self.in_doubles(columns)
+        if self.is_coupled:
+            result[:, ~self._inside(columns)] = 0.0
+        return result
+
+    def in_doubles(
+        self, columns: Mapping[str, FloatArray], *, is_upper: bool = False
+    ) -> FloatArray:
+        """Return about the lower or upper bounds of strengths, shape (rules, points).
+
+        The points are in the domain; of each input its values.
+        """
         degrees: dict[tuple[str, Literal], FloatArray] = {}
+        size = len(next(iter(columns.values()), np.zeros(SAMPLES)))
         for axis in self.used:
-            x = np.full(SAMPLES, float(axis.constant))
-            if axis.is_input:
-                x = columns[axis.name]
-            else:
-                for name, weight in axis.weights.items():
-                    x = x + float(weight) * columns[name]
-            for literal, (lower, _) in axis.parts.items():
+            x = np.full(size, float(axis.constant))
+            for name, weight in axis.weights.items():
+                x = x + float(weight) * columns[name]
+            for literal, sides in axis.parts.items():
                 pick = np.minimum if literal.negated else np.maximum
-                each = [lines_at(lines, x) for lines in lower]
+                each = [lines_at(lines, x) for lines in sides[is_upper]]
                 degrees[axis.name, literal] = functools.reduce(pick, each)
-        result = np.empty((self.count, SAMPLES))
+        result = np.empty((self.count, size))
         for place, rule in enumerate(self.rules):
-            strength = np.full(SAMPLES, float(rule.factor))
+            strength = np.full(size, float(rule.factor))
             for key in rule.literals:
                 if rule.norm == "product":
                     strength = strength * degrees[key]
                 else:
                     strength = np.minimum(strength, degrees[key])
             result[place] = strength
-        if self.is_coupled:
-            result[:, ~self._inside(columns)] = 0.0
         return result
 
     def _inside(self, columns: Mapping[str, FloatArray]) -> BoolArray:
@@ -364,6 +373,14 @@ class Base:
                     x = x + float(weight) * columns[of]
                 inside &= (x >= float(axis.low)) & (x <= float(axis.high))
         return inside
+
+
+def _drawn(axis: Axis, chance: np.random.Generator) -> FloatArray:
+    """Return doubles within a range, of few digits."""
+    low, high = float(axis.low), float(axis.high)
+    digits = 3 - math.floor(math.log10(high - low)) if high > low else 0
+    drawn = np.round(low + chance.random(SAMPLES) * (high - low), digits)
+    return np.clip(drawn, low, high)
 
 
 def lines_at(lines: Lines, x: FloatArray) -> FloatArray:

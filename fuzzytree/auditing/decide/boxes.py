@@ -303,7 +303,7 @@ def search_boxes(
         OutOfStepsError: If the budget is spent.
     """
     if base.is_coupled or any(axis.extra for axis in base.used):
-        return Open("axes share inputs, or have a value beside their range")
+        return Open("axes share inputs, or have a value beside their range", "FTD04")
     own = Budget(steps, budget)
     whole = Boxes.whole(base)
     stretches, boxes = whole.stretches, np.stack([whole.low, whole.high], axis=1)

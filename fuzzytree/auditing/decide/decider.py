@@ -62,7 +62,7 @@ class Decider:
         answer: Answer = Open("no method applies")
         is_lattice = all(rule.norm == "minimum" for rule in rules)
         if is_lattice:
-            answer = by_levels(base, question, budget)
+            answer = by_levels(base, question, None, budget)
         is_settled = is_lattice and base.is_exact
         if isinstance(answer, Open) and not base.is_coupled and not is_settled:
             answer = by_boxes(base, question, budget)
@@ -75,7 +75,8 @@ class Decider:
 
         solver = solver_for(self.base)
         if solver is None:
-            return Open(f"{last.why}; z3 is not installed, which might decide it")
+            why = f"{last.why}; z3 is not installed, which might decide it"
+            return Open(why, last.code)
         answer = solver.ask(question, budget)
         return last if isinstance(answer, Open) else answer
 

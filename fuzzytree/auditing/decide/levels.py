@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
+from typing import NamedTuple
 
 from fuzzytree.auditing.decide.answers import (
     ONE,
@@ -35,18 +36,43 @@ _Ceiling = tuple[Fraction, bool]  # a level, and whether it is itself still to b
 _TOP: _Ceiling = (ONE + 1, False)
 
 
-class _TooManyError(Exception):
+class TooManyError(Exception):
     """There are more levels, lines or smallest masks than are looked at."""
 
 
 _MOST_LEVELS = 4_000
 
 
+class Interior(NamedTuple):
+    """Only points around which it stays so: all but one of the axes are free to move.
+
+    Attributes:
+        axis: The axis that is not, on which a level is met within one of some pieces.
+        pieces: Their ends.
+    """
+
+    axis: str = ""
+    pieces: tuple[tuple[Fraction, Fraction], ...] = ()
+
+    def cells(self, axis: Axis, level: Fraction, *, is_at: bool) -> Iterator[Cell]:
+        """Yield the cells of an axis; at the very level, or at one that is like it."""
+        if axis.name == self.axis:
+            for cell in axis.cells_at(level):
+                if not cell.is_wide and any(a < cell.x < b for a, b in self.pieces):
+                    yield cell
+            return
+        is_free = bool(axis.values) or axis.low == axis.high
+        cells = axis.cells_at(level) if is_at else axis.cells(axis.place(level))
+        yield from (cell for cell in cells if cell.is_wide or is_free)
+
+
 class LevelView:
     """Some rules of a base that take the minimum, on axes with their literals alone."""
 
-    def __init__(self, base: Base, rules: Iterable[int]) -> None:
-        self.base = base
+    def __init__(
+        self, base: Base, rules: Iterable[int], interior: Interior | None = None
+    ) -> None:
+        self.base, self.interior = base, interior
         self.rules = tuple(sorted(set(rules)))
         literals: dict[str, set[Literal]] = {}
         self.alone: dict[tuple[str, Literal], int] = {}
@@ -64,11 +90,11 @@ class LevelView:
             for name, own in literals.items()
         ]
         if not all(axis.is_crossed for axis in self.axes):
-            raise _TooManyError
+            raise TooManyError
         own = factors.union(*(axis.levels for axis in self.axes))
         self.levels = sorted(level for level in own if 0 <= level <= 1)
         if len(self.levels) > _MOST_LEVELS:
-            raise _TooManyError
+            raise TooManyError
 
     def choice(
         self, question: Question, level: Fraction, budget: Budget, *, loose: bool
@@ -78,7 +104,7 @@ class LevelView:
         With `loose`, where degrees are enclosed, it may be so: none is a proof.
 
         Raises:
-            _TooManyError: If there are too many masks.
+            TooManyError: If there are too many masks.
         """
         base, count = self.base, self.base.count
         ours = _bits(question.reach)
@@ -89,7 +115,10 @@ class LevelView:
         for axis in self.axes:
             kept = self._kept(axis, question) if loose else 0
             masks: dict[int, Cell] = {}
-            cells = axis.cells(axis.place(level))
+            if self.interior is None:
+                cells = axis.cells(axis.place(level))
+            else:
+                cells = [*self.interior.cells(axis, level, is_at=False)]
             budget.spend(2 * len(cells) + 4)
             for cell in cells:
                 mine = cell.masks.perhaps if loose else cell.masks.surely
@@ -106,16 +135,16 @@ class LevelView:
         layers: list[dict[int, tuple[int, int]]] = []
         states = [start]
         for _, masks in options:
-            small = _smallest(masks)
+            small = smallest(masks)
             budget.spend(len(small) * len(states))
             step: dict[int, tuple[int, int]] = {}
             for state in states:
                 for mask in small:
                     step.setdefault(state & mask, (state, mask))
             layers.append(step)
-            states = _smallest(step)
+            states = smallest(step)
             if len(states) > _MOST_LAYERS:
-                raise _TooManyError
+                raise TooManyError
         if 0 not in states:
             return None
         state, result = 0, _Choice()
@@ -144,12 +173,16 @@ class LevelView:
         for axis in self.axes:
             masks = choice[axis.name][0].masks
             cells = axis.cells_at(level)
+            if self.interior is not None:
+                cells = self.interior.cells(axis, level, is_at=True)
             values[axis.name] = next(c.x for c in cells if c.masks == masks)
         return self.base.point(values)
 
 
-def by_levels(base: Base, question: Question, budget: Budget) -> Answer:
-    """Decide a question level by level.
+def by_levels(
+    base: Base, question: Question, interior: Interior | None, budget: Budget
+) -> Answer:
+    """Decide a question level by level; with `interior` on a part of some width.
 
     Where degrees are enclosed, `Proved` holds for the curves themselves, and a point is
     one at which bounds of their degrees suffice.
@@ -158,14 +191,21 @@ def by_levels(base: Base, question: Question, budget: Budget) -> Answer:
         OutOfStepsError: If the budget is spent.
     """
     try:
-        return _Search(base, question, budget).run()
-    except _TooManyError:
+        return _Search(base, question, budget, interior).run()
+    except TooManyError:
         return Open("there are too many levels, or ways to choose cells")
 
 
 class _Search:
-    def __init__(self, base: Base, question: Question, budget: Budget) -> None:
+    def __init__(
+        self,
+        base: Base,
+        question: Question,
+        budget: Budget,
+        interior: Interior | None,
+    ) -> None:
         self.base, self.question, self.budget = base, question, budget
+        self.interior = interior
         self.asked: list[int] = []  # rivals and weak ones that joined
         if base.is_coupled:
             self.asked = [*question.rivals, *question.weak]
@@ -173,7 +213,8 @@ class _Search:
         self.count = 0
 
     def _view(self) -> LevelView:
-        return LevelView(self.base, (*self.question.reach, *self.asked))
+        rules = (*self.question.reach, *self.asked)
+        return LevelView(self.base, rules, self.interior)
 
     def run(self) -> Answer:
         is_open, ceiling = False, _TOP
@@ -187,7 +228,7 @@ class _Search:
             self.asked.append(rival)
             self.view = self._view()
         if is_open:
-            return Open("degrees are known within bounds alone")
+            return Open("degrees are known within bounds alone", "FTD02")
         return Proved(f"{self.count} levels", self._needed())
 
     def _descend(
@@ -201,7 +242,7 @@ class _Search:
             if choice is None:
                 continue
             if self.base.is_coupled:
-                return Open("axes share inputs"), None, end, True
+                return Open("axes share inputs", "FTD04"), None, end, True
             answer, rival = self._look(level, choice)
             if answer is None and rival is None:
                 answer, rival = self._strictly(level)
@@ -229,6 +270,7 @@ class _Search:
 
     def _restricted(self) -> Question:
         asked, question = set(self.asked), self.question
+        asked.update(question.reach)
         return question._replace(
             rivals=tuple(i for i in question.rivals if i in asked),
             weak=tuple(i for i in question.weak if i in asked),
@@ -282,7 +324,7 @@ def _bits(places: Iterable[int]) -> int:
     return sum(1 << place for place in set(places))
 
 
-def _smallest(masks: Iterable[int]) -> list[int]:
+def smallest(masks: Iterable[int]) -> list[int]:
     """Return the masks that contain no other one."""
     result: list[int] = []
     for mask in sorted(masks, key=int.bit_count):

@@ -16,7 +16,7 @@ from typing import NamedTuple, NoReturn
 import msgspec
 from msgspec.structs import replace
 
-from fuzzytree.auditing.decide.answers import ONE
+from fuzzytree.auditing.decide.answers import ONE, ZERO
 from fuzzytree.auditing.decide.lines import Hedged
 from fuzzytree.model import (
     And,
@@ -25,6 +25,7 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     FuzzyTree,
+    Hedge,
     Linear,
     MembershipFunction,
     Not,
@@ -47,11 +48,12 @@ Norm = Choice["minimum", "product"]
 
 
 class Literal(msgspec.Struct, frozen=True, cache_hash=True):
-    """`variable is a or b`, perhaps negated, times a weight."""
+    """`variable is a or b`, perhaps negated, times a weight, less a lead."""
 
     functions: tuple[MembershipFunction, ...]
     negated: bool = False
     scale: Fraction = ONE
+    lowered: Fraction = ZERO
 
 
 class BaseRule(NamedTuple):
@@ -66,6 +68,7 @@ class BaseRule(NamedTuple):
         number: The number of its rule in the model, from 1, over all blocks.
         name: What messages call it.
         conclusions: Of a system, pairs of output and term.
+        when: What must hold, as people read it.
         model: The place of its model, where several stand side by side.
     """
 
@@ -77,6 +80,7 @@ class BaseRule(NamedTuple):
     name: str
     conclusions: tuple[tuple[str, str], ...] = ()
     model: int = 0
+    when: tuple[Proposition, ...] = ()
 
 
 class LeftOut(NamedTuple):
@@ -124,6 +128,7 @@ def rules_of(model: Document) -> ModelRules:
                     rule.then,
                     number,
                     f"rule {number}",
+                    when=rule.when,
                 )
                 for number, rule in enumerate(model.rules, 1)
             ]
@@ -150,9 +155,21 @@ def _functions(variables: Iterable[Variable]) -> _Terms:
 
 
 def _literal(proposition: Proposition, terms: _Terms) -> tuple[str, Literal]:
-    name = proposition.variable
+    name, hedges = proposition.variable, proposition.hedges
     functions = tuple(terms[name, term] for term in proposition.terms)
+    if proposition.negated:
+        hedges = hedges[1:]
+    if hedges:
+        functions = tuple(_hedged(function, hedges) for function in functions)
     return name, Literal(functions, proposition.negated)
+
+
+def _hedged(
+    function: MembershipFunction, hedges: tuple[Hedge, ...]
+) -> MembershipFunction:
+    if isinstance(function, Hedged):
+        return Hedged(function.function, function.height, hedges)
+    return Hedged(function, 1.0, hedges)
 
 
 # --- systems
@@ -168,7 +185,7 @@ def _decline(code: str, reason: str) -> NoReturn:
     raise _DecliningError(code, reason)
 
 
-_Way = tuple[tuple[str, Literal], ...]
+_Way = tuple[Proposition, ...]
 
 
 def _of_system(system: FuzzySystem) -> ModelRules:
@@ -205,9 +222,13 @@ def _of_system(system: FuzzySystem) -> ModelRules:
                 if block.conjunction == "product" and len(way) > 1:
                     norm = "product"
                 weight = Fraction(rule.weight)
+                literals = tuple(_literal(one, terms) for one in way)
                 if norm == "minimum":
-                    way = tuple((axis, replace(one, scale=weight)) for axis, one in way)
-                rules.append(BaseRule(way, norm, weight, then, number, own, pairs))
+                    literals = tuple(
+                        (axis, replace(one, scale=weight)) for axis, one in literals
+                    )
+                made = BaseRule(literals, norm, weight, then, number, own, pairs)
+                rules.append(made._replace(when=way))
     return ModelRules(tuple(rules), tuple(silent), tuple(left_out))
 
 
@@ -235,9 +256,9 @@ class _Conditions:
                 return self._joined(parts, is_union=negated, negated=negated)
             case Or(parts=parts):
                 if self.block.disjunction == "maximum":
-                    literal = self._one_literal(parts, negated=negated)
-                    if literal is not None:
-                        return [(literal,)]
+                    whole = self._one_proposition(parts, negated=negated)
+                    if whole is not None:
+                        return [(whole,)]
                 self._check("or", negated=negated)
                 return self._joined(parts, is_union=not negated, negated=negated)
 
@@ -259,25 +280,21 @@ class _Conditions:
         if not self.usable[name]:
             text = "a combination that is moved into a range has no exact method"
             _decline("FTD02", f"{name!r}: {text}")
-        if hedges and isinstance(function, Hedged):
-            function = Hedged(function.function, function.height, hedges)
-        elif hedges:
-            function = Hedged(function, 1.0, hedges)
-        return [((name, Literal((function,), negated)),)]
+        own: tuple[Hedge, ...] = ("not", *hedges) if negated else hedges
+        return [(replace(proposition, hedges=own),)]
 
-    def _one_literal(
+    def _one_proposition(
         self, parts: Sequence[Condition], *, negated: bool
-    ) -> tuple[str, Literal] | None:
-        """Return `x is a or x is b` as one literal, if it is that."""
+    ) -> Proposition | None:
+        """Return `x is a or x is b` as one proposition, if it is that."""
         every = [*_alternatives(parts)]
-        if any(p is None or p.hedges[:1] in (("not",), ("any",)) for p in every):
+        plain = [p for p in every if p is not None and not p.hedges]
+        if len(plain) < len(every) or len({p.variable for p in plain}) > 1:
             return None
-        ways = [self._proposition(p, negated=False) for p in every if p is not None]
-        literals = [way[0] for (way,) in ways]
-        if len({name for name, _ in literals}) > 1:
-            return None
-        functions = dict.fromkeys(f for _, one in literals for f in one.functions)
-        return literals[0][0], Literal(tuple(functions), negated)
+        for proposition in plain:
+            self._proposition(proposition, negated=False)
+        terms = dict.fromkeys(term for p in plain for term in p.terms)
+        return Proposition(plain[0].variable, tuple(terms), ("not",) if negated else ())
 
     def _check(self, word: Choice["and", "or"], *, negated: bool) -> None:
         """Raise unless a joint is exact as ways of minima or products."""

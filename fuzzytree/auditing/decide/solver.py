@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -44,6 +44,7 @@ class Solver:
         z3: The module.
         strengths: A term for each rule.
         inputs: A term for each input.
+        values: A term for each axis.
     """
 
     def __init__(self, base: Base, z3: Any) -> None:
@@ -59,6 +60,8 @@ class Solver:
             self._within(axis, self.inputs[name]) for name, axis in base.inputs.items()
         ]
         degrees: dict[tuple[str, object], Any] = {}
+        own: dict[tuple[str, object], list[Any]] = {}
+        self.values: dict[str, Any] = {}
         for name, axis in base.axes.items():
             x = self.number(axis.constant)
             for of, weight in axis.weights.items():
@@ -67,16 +70,18 @@ class Solver:
                 x = self.inputs[name]
             elif base.domain.side(name) is not None:
                 self.facts += [x >= self.number(axis.low), x <= self.number(axis.high)]
+            self.values[name] = x
             for n, literal in enumerate(axis.literals):
                 both = axis.bounds[literal]
                 degree = z3.Real(f"degree {n} of {name}", self.context)
                 degrees[name, literal] = degree
-                if both.is_exact:
-                    self.facts.append(degree == self.lines(both.lower, x))
-                else:
-                    self.facts.append(degree >= self.lines(both.lower, x))
-                    self.facts.append(degree <= self.lines(both.upper, x))
+                facts = [degree == self.lines(both.lower, x)]
+                if not both.is_exact:
+                    facts = [degree >= self.lines(both.lower, x)]
+                    facts.append(degree <= self.lines(both.upper, x))
+                own[name, literal] = facts
         self.strengths: list[Any] = []
+        self.rule_facts: list[list[Any]] = []
         self.is_linear = True
         for place, rule in enumerate(base.rules):
             strength = self.number(rule.factor)
@@ -88,8 +93,9 @@ class Solver:
                 else:
                     strength = z3.If(strength <= degree, strength, degree)
             term = z3.Real(f"rule {place + 1}", self.context)
-            self.facts.append(term == strength)
             self.strengths.append(term)
+            facts = [fact for key in rule.literals for fact in own[key]]
+            self.rule_facts.append([*facts, term == strength])
         self._open = self._new()
 
     def _new(self) -> Any:
@@ -154,7 +160,8 @@ class Solver:
         def holds(point: dict[str, Fraction]) -> bool:
             return question.holds(*self.base.strengths(point, rules))
 
-        return self.ask_formula(self.formula(question), holds, budget, resources)
+        formula = self.formula(question)
+        return self.ask_formula(formula, holds, budget, rules, resources)
 
     def formula(self, question: Question) -> Any:
         """Return a question as a formula."""
@@ -174,9 +181,12 @@ class Solver:
         formula: Any,
         holds: Callable[[dict[str, Fraction]], bool],
         budget: Budget,
+        rules: Iterable[int] | None = None,
         resources: int = RESOURCES,
     ) -> Answer:
         """Look for a point at which a formula is true, and something holds exactly.
+
+        `rules`: those that the formula is about; all unless given.
 
         Raises:
             OutOfStepsError: If the budget is spent.
@@ -187,6 +197,9 @@ class Solver:
         solver = self._open if self.is_linear else self._new()
         solver.push()
         solver.set("rlimit", most)
+        places = range(self.base.count) if rules is None else dict.fromkeys(rules)
+        for place in places:
+            solver.add(*self.rule_facts[place])
         solver.add(formula)
         before = _used(solver)
         result = solver.check()

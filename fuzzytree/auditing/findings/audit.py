@@ -12,7 +12,8 @@ from typing import NamedTuple, cast
 
 import msgspec
 
-from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
+from fuzzytree.auditing.decide import Budget, OutOfStepsError
+from fuzzytree.auditing.decide.answers import Progress
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Computed, Declined, Proved, counted
 from fuzzytree.auditing.findings.codes import (
@@ -40,7 +41,7 @@ from fuzzytree.auditing.findings.records import (
     SourceFile,
     digest_of,
 )
-from fuzzytree.auditing.findings.subject import AuditView, Material, Subject
+from fuzzytree.auditing.findings.subject import AuditView, Material, Subject, subject_of
 from fuzzytree.auditing.findings.table_words import Words
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.errors import LossError, ReadError
@@ -77,7 +78,7 @@ def audit(
     row: Mapping[str, float] | None = None,
     selection: AuditSelection | None = None,
     settings: AuditSettings | None = None,
-    clock: Clock | None = None,
+    report: Progress | None = None,
     repeat: str = "",
 ) -> Audit:
     """Answer every question about a model.
@@ -91,7 +92,8 @@ def audit(
         row: A row whose nearest other decision is also sought.
         selection: The codes to answer; all by default.
         settings: The thresholds.
-        clock: The budget; that of the settings by default.
+        report: Called with what is done now, and with the share of all work that is
+            done, in [0, 1].
         repeat: The command that repeats this audit.
 
     Raises:
@@ -116,12 +118,11 @@ def audit(
     if viewed.raw is not None and not selection.select:
         reasons |= dict.fromkeys(wanted & {_OF_RAW_RULES}, _RAW)
     progress = _Progress([*viewed.declined], {})
-    clock = clock or Clock(settings.budget_s)
+    budget = Budget(int(settings.budget * 1e6), report=report)
     if viewed.rules is not None:
-        facts = msgspec.structs.asdict(viewed)
-        subject = Subject(**facts, settings=settings, clock=clock, rows=rows)
+        subject = subject_of(viewed, settings, budget, rows)
         asked = {code for code in wanted if reasons.get(code) != _RAW}
-        _run_all([*_tasks(asked, row)], subject, clock, progress)
+        _run_all([*_tasks(asked, row)], subject, progress)
     words = Words(viewed.domain, model.variables)
     worded = map(words.answer, progress.answers)
     answers = tuple(_located(worded, wanted, viewed, material, repeat))
@@ -297,24 +298,23 @@ def _row_answers(row: Mapping[str, float], subject: Subject) -> Iterator[AuditAn
     return row_answers(subject, row)
 
 
-def _run_all(
-    tasks: Sequence[_Task], subject: Subject, clock: Clock, progress: _Progress
-) -> None:
+def _run_all(tasks: Sequence[_Task], subject: Subject, progress: _Progress) -> None:
     """Run all tasks, each within its part of the budget."""
-    why = f"the budget of {subject.settings.budget_s:g} s is spent"
+    why = f"the budget of {subject.settings.budget:g} million steps is spent"
+    budget = subject.budget
     for position, task in enumerate(tasks):
         part = 1.0 if position == len(tasks) - 1 else task.part
-        share = clock.share(part, report=_reporter(clock, position, len(tasks)))
+        report = _reporter(budget, position, len(tasks))
+        share = budget.share(part, report=report)
         try:
-            clock.check()
+            budget.check()
             share.report(CODES[task.codes[0]].title, 0.0)
-            with enforced(share):
-                for answer in task.run(msgspec.structs.replace(subject, clock=share)):
-                    progress.answers.append(answer)
-                    state = answer.state
-                    if isinstance(state, Declined) and state.code == _LATE:
-                        progress.cut[answer.code] = why
-        except OutOfTimeError:
+            for answer in task.run(msgspec.structs.replace(subject, budget=share)):
+                progress.answers.append(answer)
+                state = answer.state
+                if isinstance(state, Declined) and state.code == _LATE:
+                    progress.cut[answer.code] = why
+        except OutOfStepsError:
             progress.cut.update(dict.fromkeys(task.codes, why))
         except MemoryError:
             progress.cut.update(dict.fromkeys(task.codes, _TOO_LARGE))
@@ -324,9 +324,9 @@ def _run_all(
             return
 
 
-def _reporter(clock: Clock, position: int, count: int) -> Callable[[str, float], None]:
+def _reporter(budget: Budget, position: int, count: int) -> Progress:
     """Return a function that reports a family's progress as part of the whole."""
-    return lambda text, share: clock.report(text, (position + share) / count)
+    return lambda text, share: budget.report(text, (position + share) / count)
 
 
 def _unasked(
@@ -364,11 +364,9 @@ def _located(
 ) -> Iterator[AuditAnswer]:
     """Yield the wanted answers with ids, places and the commands that repeat them."""
     kept = sorted((a for a in answers if a.code in wanted), key=lambda a: a.code)
-    bounds = viewed.bounds
-    whole = (viewed.rules, viewed.raw) if bounds is None else (bounds.lower,)
+    whole = viewed.rules, viewed.raw
     representations = [rules for rules in whole if rules is not None]
-    curves = {name: one.key for name, one in bounds.terms.items()} if bounds else {}
-    for answer in with_ids(kept, representations, curves):
+    for answer in with_ids(kept, representations, viewed.curves):
         numbers = [viewed.numbers[number - 1] for number in answer.rules]
         if not numbers and answer.subject in viewed.left_out:
             numbers = [viewed.left_out[answer.subject]]

@@ -60,7 +60,7 @@ def nauck(subject: Subject) -> list[tuple[str, Bounds]]:
     terms = set(used_terms(subject.rules))
     names = {variable for variable, _ in terms}
     used = [of for of in ranges(subject) if of.variable.name in names]
-    is_known = subject.bounds is None or terms.isdisjoint(subject.bounds.terms)
+    is_known = terms.isdisjoint(subject.inexact)
     if not used or not is_known or any(of.low == of.high for of in used):
         return []
     lengths = [len({c.variable for c in rule.when}) for rule in subject.rules.rules]

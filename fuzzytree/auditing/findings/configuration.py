@@ -40,7 +40,7 @@ from fuzzytree.model import Path, as_names, name_choice
 _SHARES = ("epsilon", "margin", "lead", "level", "overlap")
 _RANGES: Mapping[str, tuple[float, str]] = {
     **dict.fromkeys(_SHARES, (1.0, "above 0 and at most 1")),
-    "budget_s": (1e9, "above 0 and at most 1e9 seconds"),
+    "budget": (1e9, "above 0 and at most 1e9 million steps"),
 }
 _COUNTS: Mapping[str, tuple[int, int]] = {
     "rows": (1, 10_000_000),
@@ -94,8 +94,7 @@ def check_settings(settings: AuditSettings) -> None:
     for name, (high, allowed) in _RANGES.items():
         value = getattr(settings, name)
         if not 0.0 < value <= high:
-            shown = "the budget" if name == "budget_s" else name
-            raise ValueError(f"{shown} must be {allowed}, not {value!r}")
+            raise ValueError(f"{name} must be {allowed}, not {value!r}")
     for name, (least, most) in _COUNTS.items():
         value = getattr(settings, name)
         if not least <= value <= most:
@@ -114,7 +113,7 @@ def settings_with(settings: AuditSettings, texts: Mapping[str, str]) -> AuditSet
         >>> settings_with(AuditSettings(), {"epsilon": "0.2"}).epsilon
         0.2
     """
-    known = [name for name in (*_RANGES, *_COUNTS) if name != "budget_s"]
+    known = [name for name in (*_RANGES, *_COUNTS) if name != "budget"]
     values: dict[str, float] = {}
     for name, text in texts.items():
         if name not in known:
@@ -160,7 +159,7 @@ class SettingsOfFile(FileRecord, frozen=True, kw_only=True):
     overlap: float | None = None
     rows: int | None = None
     seed: int | None = None
-    budget_s: float | None = field(name="budget", default=None)
+    budget: float | None = None
 
     def __iter__(self) -> Iterator[tuple[str, float]]:
         """Yield the settings of the file by name."""
@@ -229,7 +228,7 @@ def _wrong(bound: Configuration) -> Iterator[tuple[Path, str]]:
         try:
             check_settings(msgspec.structs.replace(AuditSettings(), **{name: value}))
         except ValueError as error:
-            yield ("settings", "budget" if name == "budget_s" else name), str(error)
+            yield ("settings", name), str(error)
     for position, fault in _wrong_limits(bound.limits):
         yield ("limits", position), fault
     for key in ("select", "skip"):

@@ -75,7 +75,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
         return
     runs = [*_runs(subject.rules if subject.tree is None else subject.tree)]
     for question in questions(subject):
-        subject.clock.check()
+        subject.budget.check()
         values = question.values
         results = [ModelRun(title, form, run(values)) for title, form, run in runs]
         yield from convention_answers(subject, question, results)
@@ -248,7 +248,7 @@ def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[AuditAnswer]:
     for question in questions(subject):
         if question.name not in _OF_SYSTEMS:
             continue
-        subject.clock.check()
+        subject.budget.check()
         results = [(name, run(question.values)) for name, run in runs]
         yield from system_answers(subject, question, results)
 

@@ -31,7 +31,6 @@ from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.rows import (
     DomainRows,
-    budget_of,
     distance_measure,
     narrowed_state,
     points_of,
@@ -173,7 +172,7 @@ class _Rows:
         self, both: TreeAndRules, rows: Sequence[_Row], subject: Subject
     ) -> None:
         self.both, self.rows, self.subject = both, rows, subject
-        self.budget = budget_of(subject).share(_PART)
+        self.budget = subject.budget.share(_PART)
         self.count = self.row = 0
         self.low: Fraction | None = None
         self.best: Nearest | None = None
@@ -202,7 +201,7 @@ class _Rows:
             number, row = self.rows[place]
             share = self.count / len(self.rows)
             text = f"nearest disagreement to row {number}"
-            self.subject.clock.report(text, share)
+            self.subject.budget.report(text, share)
             result = self.both.nearest(row, self.best, self.budget)
             if result.is_none:  # and so for all of them: it covered the domain
                 self.count, self.low = len(self.rows), None
@@ -279,10 +278,10 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     drawn = both.drawn()
     alike = 0
     for leaf in range(1, len(tree.leaves) + 1):
-        subject.clock.report(
+        subject.budget.report(
             f"leaf {leaf} against the raw rules", leaf / len(tree.leaves)
         )
-        budget = budget_of(subject).share(_LEAF_PART)
+        budget = subject.budget.share(_LEAF_PART)
         point, state = _leaf_difference(both, leaf, drawn.get(leaf), budget)
         if point is not None:
             known.append(point)

@@ -73,7 +73,7 @@ def leaf_regions(
         why = f"the leaves are made of {count} boxes, more than {MOST_LISTED}"
         yield audit_answer("FT205.not-listed", "leaves", Declined("FTD05", why))
     for region in tree_regions:
-        subject.clock.check()
+        subject.budget.check()
         inside = [*boxes(region, tree, subject.domain)]
         met = [(box, point_in(box, tree)) for box in inside]
         parts = [(box, point) for box, point in met if point is not None]

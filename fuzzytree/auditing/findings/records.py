@@ -128,7 +128,8 @@ class AuditSettings(Value, frozen=True):
         overlap: Two terms of a variable are hard to distinguish from this share on.
         rows: How many rows a sampled share looks at.
         seed: Of what is drawn.
-        budget_s: After so many seconds nothing new is begun; above 0.
+        budget: How many million steps the proofs may take; above 0. A million is about
+            a second of work, and the same answers on any machine.
     """
 
     epsilon: float = 0.1
@@ -138,7 +139,7 @@ class AuditSettings(Value, frozen=True):
     overlap: float = 0.75
     rows: int = 20_000
     seed: int = 0
-    budget_s: float = 60.0
+    budget: float = 60.0
 
 
 class SourceFile(Value, frozen=True):

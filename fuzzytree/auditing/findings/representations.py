@@ -47,14 +47,14 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     Raises:
         OutOfTimeError: If the budget is spent.
     """
-    subject.clock.check()
+    subject.budget.check()
     values, how = _points(subject)
     result = agreement(subject, values)
     yield from agreement_answers(subject, result, values)
     if subject.system is None:
         models = {str(name): form for name, form in forms(_model(subject)).items()}
         for one in result.certificates:
-            subject.clock.check()
+            subject.budget.check()
             yield from _certified(
                 subject, one, models[one.representation.rpartition(" in ")[0]], how
             )

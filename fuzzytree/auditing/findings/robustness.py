@@ -30,7 +30,6 @@ from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.rows import (
     DomainRows,
-    budget_of,
     distance_measure,
     narrowed_state,
     points_of,
@@ -85,7 +84,7 @@ def radius(subject: Subject, row: Mapping[str, float]) -> AuditAnswer:
     """
     point = _point(subject, row)
     decider = RowDecider(subject)
-    result = nearest(decider.base, point, budget=budget_of(subject))
+    result = nearest(decider.base, point, budget=subject.budget)
     return _answer(decider, "the row", point, result)
 
 
@@ -186,14 +185,14 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
         return
     points = points_of(subject, subject.rows)
     decider = RowDecider(subject)
-    budget = budget_of(subject).share(_PART)
+    budget = subject.budget.share(_PART)
     radii: list[_RowRadius] = []
     most = MOST_ROWS if subject.tree is None else MOST_ROWS_OF_TREE
     chosen = points.at[:most]
     for number, point in chosen:
         if budget.is_spent:
             break
-        subject.clock.report(f"radius of row {number}", len(radii) / len(chosen))
+        subject.budget.report(f"radius of row {number}", len(radii) / len(chosen))
         result = nearest(decider.base, point, budget=budget)
         is_worth_keeping = result.is_narrow or (not radii and result.high is not None)
         if budget.is_spent and not is_worth_keeping:

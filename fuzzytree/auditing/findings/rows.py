@@ -9,7 +9,6 @@ from fractions import Fraction
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.decide.answers import STEPS, Budget
 from fuzzytree.auditing.decide.costs import Costs, Nearest
 from fuzzytree.auditing.decide.polytopes import Polytopes, polytope_of
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains
@@ -31,12 +30,6 @@ from fuzzytree.model import Variable
 from fuzzytree.numerics import decide, outwards
 
 _MOST_DIGITS = 80  # of an exact number beside a double
-
-
-def budget_of(subject: Subject) -> Budget:
-    """Return the budget of an audit."""
-    budget = getattr(subject, "budget", None)
-    return budget if isinstance(budget, Budget) else Budget(STEPS)
 
 
 class DomainRows(msgspec.Struct, frozen=True, eq=False):

@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Final, TypeVar
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import msgspec
 
-from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
+from fuzzytree.auditing.decide import Answer, Base, Budget, Open
+from fuzzytree.auditing.decide import Proved as NoPoint
+from fuzzytree.auditing.decide.claims import Claims
+from fuzzytree.auditing.decide.pairs import Pairs
+from fuzzytree.auditing.decide.rules import BaseRule
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import Declined, counted
-from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.engine.states import Declined, Proved, State
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,
     AuditSettings,
     Policy,
     SourceFile,
 )
-from fuzzytree.auditing.findings.rule_bounds import BoundedRules
-from fuzzytree.model import Document, FuzzySystem, FuzzyTree, RuleBase
+from fuzzytree.model import (
+    Document,
+    FuzzySystem,
+    FuzzyTree,
+    MembershipFunction,
+    RuleBase,
+)
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.findings.locations import ModelFile
     from fuzzytree.auditing.findings.results import LoadedResult
     from fuzzytree.model import FloatArray, IntArray
+
+
+Name = tuple[str, str]
+"""A variable, and one of its terms."""
 
 
 class AuditRows(msgspec.Struct, frozen=True, eq=False):
@@ -63,9 +76,9 @@ class AuditView(msgspec.Struct, frozen=True, eq=False):
     """A model's rules as they are audited.
 
     Attributes:
-        rules: The rules as people read them, without weights, each inexact curve
-            as its lower bound; None if not one rule of a system could be
-            taken over.
+        rules: The rules as people read them, without weights; None if not one rule of
+            a system could be taken over.
+        base_rules: The same rules as the decider takes them.
         policy: How they decide.
         domain: The domain: where inputs are moved into their range, not
             beyond it.
@@ -79,10 +92,13 @@ class AuditView(msgspec.Struct, frozen=True, eq=False):
         left_out: The number in the model of each rule that is named there.
         is_whole: Whether no rule is left out that may fire. Otherwise where no rule of
             the view fires another one may.
-        bounds: The rules from below and from above; None if they are plain.
+        curves: The functions of a system's terms that lines enclose.
+        inexact: Those and all others that have no exact shape, hedged ones too; in
+            `rules` a plateau stands for each.
     """
 
     rules: RuleBase | None
+    base_rules: tuple[BaseRule, ...]
     policy: Policy
     domain: Domain
     tree: FuzzyTree | None = None
@@ -92,7 +108,8 @@ class AuditView(msgspec.Struct, frozen=True, eq=False):
     numbers: tuple[int, ...] = ()
     declined: tuple[AuditAnswer, ...] = ()
     is_whole: bool = True
-    bounds: BoundedRules | None = None
+    curves: Mapping[Name, MembershipFunction] = {}
+    inexact: frozenset[Name] = frozenset()
     left_out: Mapping[str, int] = {}
 
     def rule_name(self, number: int) -> str:
@@ -106,50 +123,65 @@ class Subject(AuditView, frozen=True, eq=False, kw_only=True):
     Attributes:
         rules: As in a view, at least one.
         settings: The thresholds.
-        clock: How much time is left.
+        budget: How many steps are left.
+        pairs: What is asked of pairs of its rules, and of one.
         rows: The user's rows.
     """
 
     rules: RuleBase
     settings: AuditSettings
-    clock: Clock
+    budget: Budget
+    pairs: Pairs
     rows: AuditRows | None = None
 
+    @property
+    def claims(self) -> Claims:
+        """What is asked of the rules."""
+        return self.pairs.claims
 
-_MOST: Final = 0.25  # of the time that is left, for one question
-_FAIR: Final = 4.0  # times as much as its own share may one of many take
+    @property
+    def base(self) -> Base:
+        """The rules, ready for questions."""
+        return self.pairs.base
 
-_Result = TypeVar("_Result")
+    def class_at(
+        self, point: Mapping[str, Fraction], without: int | None = None
+    ) -> str | None:
+        """Return the class at a point, perhaps without the rule at a position."""
+        every = [place for place in range(self.base.count) if place != without]
+        low, _ = self.base.strengths(point, every)
+        best = max(every, key=lambda place: (low[place], -place), default=None)
+        if best is None or low[best] <= 0:
+            return self.policy.uncovered
+        return self.base.rules[best].then
 
 
-class TimeSlices:
-    """Many questions of one kind that share the remaining time.
+def subject_of(
+    viewed: AuditView,
+    settings: AuditSettings,
+    budget: Budget | None = None,
+    rows: AuditRows | None = None,
+) -> Subject:
+    """Return the rules of a view, ready for questions.
 
-    Attributes:
-        left_out: How many were not answered; the caller counts them.
+    Raises:
+        ValueError: If it has none, or an input has no side.
     """
+    is_class = viewed.policy.decision == "strongest" or viewed.system is None
+    asked = viewed.rules if is_class else viewed.system
+    if asked is None:
+        raise ValueError("there is no rule to audit")
+    variables = {variable.name: variable for variable in asked.variables}
+    base = Base(viewed.base_rules, variables, viewed.domain, seed=settings.seed)
+    budget = budget or Budget(int(settings.budget * 1e6))
+    pairs = Pairs(Claims(base, viewed.policy.uncovered))
+    facts = msgspec.structs.asdict(viewed)
+    return Subject(**facts, settings=settings, budget=budget, pairs=pairs, rows=rows)
 
-    def __init__(self, clock: Clock, part: float) -> None:
-        self.clock = clock.share(part)
-        self.left_out = 0
 
-    def run(self, left: int, question: Callable[[Clock], _Result]) -> _Result | None:
-        """Return the answer to the first of `left` questions, None without time."""
-        if self.clock.is_over:
-            return None
-        own = self.clock.share(min(_MOST, _FAIR / left))
-        try:
-            with enforced(own):
-                return question(own)
-        except OutOfTimeError:
-            return None
-
-    def rest(self, code: str, noun: str) -> Iterator[AuditAnswer]:
-        """Yield that some questions are open, if there are any."""
-        if self.left_out:
-            yield audit_answer(
-                f"{code}.left-open",
-                f"{counted(self.left_out, noun)} left open",
-                Declined("FTD03", "the budget was spent"),
-                facts={"count": self.left_out},
-            )
+def state_of(answer: Answer) -> State:
+    """Return an answer without a point as a state."""
+    if isinstance(answer, NoPoint):
+        return Proved(answer.how, tuple(place + 1 for place in answer.rivals))
+    assert isinstance(answer, Open)  # a point needs claims
+    return Declined(answer.code, answer.why)

@@ -46,6 +46,7 @@ from fuzzytree.numerics import (
 CONFIDENCE: Final = 0.95
 """Of every interval."""
 
+_NEAR = 1e-12  # doubles that are so near are compared in fractions
 _STEP = 4096  # rows between two looks at the clock
 _MOST_DEGREES = 1 << 24  # of all propositions at points that are drawn
 _LEAST_ROWS = 1000  # that are drawn however many propositions there are
@@ -182,7 +183,7 @@ def count_rows(
     fired, won, right = (np.zeros(count, np.int64) for _ in range(3))
     owner = np.array([rules.classes.index(rule.then) for rule in rules.rules])
     for start in range(0, values.shape[1], _STEP):
-        subject.clock.check()
+        subject.budget.check()
         part = values[:, start : start + _STEP]
         decisions = decide(rules, part)
         fires, is_weak, margin = _settled(subject, part, decisions)
@@ -232,7 +233,7 @@ def _settled(
         is_open |= (decisions.margin <= limit) & (decisions.margin_high > limit)
     is_open &= decisions.status != MISSING
     for row in np.flatnonzero(is_open).tolist():
-        subject.clock.check()
+        subject.budget.check()
         named = dict(zip(rules.inputs, values[:, row].tolist(), strict=True))
         answer = exact_answer(rules, named)
         fires[:, row] = [strength > 0 for strength in answer.strengths]
@@ -279,7 +280,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
 def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
     """Yield what the user's rows say, of all rules together and of each."""
     codes = None if subject.system else rows.codes  # a view has classes of its own
-    lower, most = _both(subject, rows.values, codes)
+    lower, most = _both(subject, rows.values, codes, is_each=True)
     how = f"every row of {rows.name}"
     total = lower.rows
     for message, name, hits in (
@@ -322,17 +323,67 @@ def _of_domain(subject: Subject) -> Iterator[AuditAnswer]:
 
 
 def _both(
-    subject: Subject, values: FloatArray, codes: IntArray | None = None
+    subject: Subject,
+    values: FloatArray,
+    codes: IntArray | None = None,
+    *,
+    is_each: bool = False,
 ) -> tuple[RuleCounts, RuleCounts]:
-    """Count what the rules say from below, and from above; see `counted`."""
-    if subject.bounds is None:
+    """Count what the rules say from below, and from above; perhaps each of them."""
+    if subject.policy.decision == "strongest":
         counts = count_rows(subject, values, codes)
         return counts, counts
-    lower, upper = (
-        msgspec.structs.replace(subject, rules=rules)
-        for rules in (subject.bounds.lower, subject.bounds.upper)
-    )
-    return count_rows(lower, values, codes), count_rows(upper, values, codes)
+    return _fired(subject, values, is_each=is_each)
+
+
+def _fired(
+    subject: Subject, values: FloatArray, *, is_each: bool
+) -> tuple[RuleCounts, RuleCounts]:
+    """Count on which rows conditions of a system hold, at least and at most.
+
+    Where doubles leave it open, or lines around curves end, a row is evaluated exactly.
+    """
+    base, epsilon = subject.base.fine, Fraction(subject.settings.epsilon)
+    outside = rows_outside(subject.rules, subject.domain, values)
+    known = ~np.isnan(values).any(axis=0)
+    columns = dict(zip(subject.rules.inputs, values, strict=True))
+    sides = [base.in_doubles(columns, is_upper=is_upper) for is_upper in (False, True)]
+    is_open = outside & np.isfinite(values).all(axis=0)
+    looks = [side if is_each else side.max(axis=0, keepdims=True) for side in sides]
+    for limit in (0.0, subject.settings.epsilon):
+        is_near = (looks[0] <= limit) & (looks[1] > limit)
+        if limit:
+            is_near |= (looks[0] <= limit + _NEAR) & (looks[1] >= limit - _NEAR)
+        is_open |= known & is_near.any(axis=0)
+    for row in np.flatnonzero(is_open).tolist():
+        subject.budget.check()
+        point = {name: Fraction(float(x[row])) for name, x in columns.items()}
+        for side, exact in zip(sides, base.strengths(point), strict=True):
+            side[:, row] = [_rounded(strength, epsilon) for strength in exact]
+    results = []
+    for side in sides:
+        best = side.max(axis=0)
+        results.append(
+            RuleCounts(
+                rows=values.shape[1],
+                missing=int((~known).sum()),
+                fired=((side > 0.0) & known).sum(axis=1),
+                won=np.zeros(base.count, np.int64),
+                right=None,
+                uncovered=int((known & (best <= 0.0)).sum()),
+                weak=int((known & (best < subject.settings.epsilon)).sum()),
+                tied=0,
+                close=0,
+                outside=int(outside.sum()),
+            )
+        )
+    return results[0], results[1]
+
+
+def _rounded(strength: Fraction, limit: Fraction) -> float:
+    """Return a strength as a double, on its side of a limit."""
+    near = float(strength)
+    return math.nextafter(near, -math.inf) if strength < limit <= near else near
 
 
 def _shares(

@@ -15,16 +15,25 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.decide import measures
 from fuzzytree.auditing.decide.answers import ONE, ZERO
+from fuzzytree.auditing.decide.axes import function_lines
 from fuzzytree.auditing.decide.lines import Between, Lines, combined, constant, lines_of
 from fuzzytree.auditing.decide.measures import Bounds
 from fuzzytree.auditing.engine import states
 from fuzzytree.auditing.engine.domain import span
 from fuzzytree.auditing.engine.states import Bracket, Computed, Proved, State, counted
 from fuzzytree.auditing.findings.codes import audit_answer
-from fuzzytree.auditing.findings.curve_bounds import CurveBounds
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model import LR, Points, RuleBase, Shape, Term, Variable, questions
+from fuzzytree.model import (
+    LR,
+    MembershipFunction,
+    Points,
+    RuleBase,
+    Shape,
+    Term,
+    Variable,
+    questions,
+)
 from fuzzytree.numerics import exact_degree, outwards
 from fuzzytree.rechecking import listed
 
@@ -36,7 +45,7 @@ class VariableRange(NamedTuple):
     """A variable with its terms and its values on the domain.
 
     Attributes:
-        bounds: The terms whose curves lie between two; their shape is the lower one.
+        curves: The functions of the terms that have no exact shape.
         is_open: Whether the least value is left out.
         values: Those of rows, one by one; empty of numbers.
     """
@@ -44,14 +53,14 @@ class VariableRange(NamedTuple):
     variable: Variable
     low: Fraction
     high: Fraction
-    bounds: Mapping[str, CurveBounds] = MappingProxyType({})
+    curves: Mapping[str, MembershipFunction] = MappingProxyType({})
     is_open: bool = False
     values: Sequence[Fraction] = ()
 
     @property
     def terms(self) -> list[Term]:
-        """The terms whose curves are known."""
-        return [one for one in self.variable.terms if one.name not in self.bounds]
+        """The terms with an exact shape."""
+        return [one for one in self.variable.terms if one.name not in self.curves]
 
     def lines(self, shape: Shape) -> Between:
         """Return a curve as lines; of single values each is level for a length of 1.
@@ -75,23 +84,21 @@ class VariableRange(NamedTuple):
 def ranges(subject: Subject) -> tuple[VariableRange, ...]:
     """Return the range of each variable that has terms; none if the domain is empty.
 
-    Terms that only the view of a system has, such as `very high`, are left out.
+    Terms without an exact shape, of a system, come with their function.
     """
     result: list[VariableRange] = []
-    whole = subject.system if subject.bounds and subject.system else subject.rules
-    own = {*_terms(whole.variables)}
-    bounds = subject.bounds.terms if subject.bounds else {}
     for variable in subject.rules.variables:
         name, side = variable.name, subject.domain.side(variable.name)
         low, high = span(variable, subject.domain)
         if low > high:
             return ()
-        terms = [t for t in variable.terms if (name, t.name) in own]
+        curves = {label: f for (of, label), f in subject.curves.items() if of == name}
+        inexact = {label for of, label in subject.inexact if of == name} - {*curves}
+        terms = [term for term in variable.terms if term.name not in inexact]
         if terms:
             variable = replace(variable, terms=tuple(terms))
-            between = {of[1]: one for of, one in bounds.items() if of[0] == name}
             is_open = side is not None and side.is_open and low == side.low < high
-            row = variable, low, high, between, is_open, listed(side)
+            row = variable, low, high, curves, is_open, listed(side)
             result.append(VariableRange(*row))
     return tuple(result)
 
@@ -120,14 +127,15 @@ def _heights(subject: Subject) -> Iterator[AuditAnswer]:
     clean, lowest = 0, ONE
     for of in ranges(subject):
         for term in of.variable.terms:
-            subject.clock.check()
-            between = of.bounds.get(term.name)
-            (low, high), at = measures.height(of.lines(term.shape))
-            if between is not None:
-                high = measures.height(of.lines(between.upper))[0].high
+            subject.budget.check()
+            curve = of.curves.get(term.name)
+            lines = of.lines(term.shape)
+            if curve is not None:
+                lines = function_lines(curve, of.low, of.high)
+            (low, high), at = measures.height(lines)
             if low >= level:
                 clean, lowest = clean + 1, min(lowest, low)
-            elif high and (between is not None or high >= level or high - low > _NEAR):
+            elif high and (curve is not None or high >= level or high - low > _NEAR):
                 message = "FT401.low-curve" if high < level else "FT401.open"
                 what = f"the largest degree of {_title(of, [term])}"
                 state = Bracket(what, outwards(low)[0], outwards(high)[1], _INEXACT)
@@ -232,7 +240,7 @@ def shape_answers(subject: Subject) -> Iterator[AuditAnswer]:
     is_curved = False
     for of in ranges(subject):
         for term in of.terms:
-            subject.clock.check()
+            subject.budget.check()
             every = [*_defects(of, term)]
             defects = [one for one in every if one is not None]
             shallow += len(every) - len(defects)
@@ -358,7 +366,7 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
             if most[a, b] < limit:
                 apart += 1
                 continue
-            subject.clock.check()
+            subject.budget.check()
             pair = terms[a], terms[b]
             if sum(len(term.shape.knots()) for term in pair) > _MOST_KNOTS:
                 why = f"their curves have more than {_MOST_KNOTS} pieces"

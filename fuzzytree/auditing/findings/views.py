@@ -1,57 +1,50 @@
-"""The rules of a model as an audit sees them: a rule base with all its meaning.
+"""The rules of a model as an audit sees them, and what is left out of it.
 
 Rule bases and trees are audited as they are. A fuzzy system that only stands for a rule
-base is audited as that one. Of any other system a *view* is made: its conditions as
-rules whose classes are the texts of what they conclude. A rule of `a and (b
-or c)` becomes two rules, one for each way in which it can hold: under minimum or
-product, and maximum, its strength is that of the stronger one, exactly. A curve
-without an exact counterpart is bounded by two lines of points, and a weight is part
-of a rule (see `rule_bounds`). What has no place here is left out, and an answer says
-so for each term and each rule.
-
-A view shows how strongly conditions hold, at every double. What outputs make of it,
-their curves and numbers, is not part of it.
+base is audited as that one. Of any other system the conditions are audited, as rules
+whose classes are the texts of what they conclude; `fuzzytree.auditing.decide.rules`
+says how. What outputs make of them, their curves and numbers, is not part of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
 
 import msgspec
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.axes import function_lines
+from fuzzytree.auditing.decide.lines import Hedged
+from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, rules_of
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, span
 from fuzzytree.auditing.engine.states import Declined, Proved
 from fuzzytree.auditing.findings.codes import audit_answer
-from fuzzytree.auditing.findings.records import AuditAnswer, Policy
-from fuzzytree.auditing.findings.rule_bounds import bounded_rules
-from fuzzytree.auditing.findings.subject import AuditView
-from fuzzytree.auditing.findings.system_conditions import (
-    MOST_QUESTIONS,
-    Conditions,
-    DecliningError,
-    SystemTerms,
-    Way,
-    decline,
-    ranges_of,
-    terms_of,
-)
+from fuzzytree.auditing.findings.records import AuditAnswer, Policy, TermName
+from fuzzytree.auditing.findings.subject import AuditView, Name
 from fuzzytree.model import (
     And,
-    Conclusion,
+    Band,
     Conjunction,
     Document,
+    Formula,
     FuzzySystem,
     FuzzyTree,
+    Linear,
+    MembershipFunction,
+    Points,
+    Proposition,
     Rule,
     RuleBase,
-    RuleBlock,
     Semantics,
-    SystemRule,
+    Shape,
+    Term,
     Variable,
     joints,
     questions,
 )
-from fuzzytree.semantics import as_rules, rules_from_tree
+from fuzzytree.numerics import outwards
+from fuzzytree.semantics import as_rules, rules_from_tree, shape_of
 
 
 def view(model: Document, domain: Domain) -> AuditView:
@@ -59,7 +52,7 @@ def view(model: Document, domain: Domain) -> AuditView:
 
     Args:
         model: A tree: its relative rules, which decide as it does. A rule base: itself.
-            A system: the rule base it stands for, or a view of it.
+            A system: the rule base it stands for, or its conditions.
         domain: The domain of the audit.
 
     Example:
@@ -85,8 +78,10 @@ def view(model: Document, domain: Domain) -> AuditView:
 def _of_rules(rules: RuleBase, domain: Domain) -> AuditView:
     meant = rules.semantics
     policy = Policy(meant.conjunction, "strongest", meant.uncovered, meant.missing)
-    numbers = tuple(range(1, len(rules.rules) + 1))
-    return AuditView(rules, policy, domain, numbers=numbers)
+    every = rules_of(rules).rules
+    return AuditView(
+        rules, every, policy, domain, numbers=tuple(one.number for one in every)
+    )
 
 
 # --- systems
@@ -94,41 +89,63 @@ def _of_rules(rules: RuleBase, domain: Domain) -> AuditView:
 
 def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
     conjunction = _conjunction(system)
-    sides, moved = _within(system, domain)
-    ranges = ranges_of(system, sides)
-    terms, declined = terms_of(system, ranges)
-    taken = _Taken(conjunction, terms, [*moved, *declined])
-    number = 0
-    for position, block in enumerate(system.blocks, 1):
-        if block.activation.method != "general":
-            taken.note_activation(position, block)
-        for index, rule in enumerate(block.rules, 1):
-            number += 1
-            of_block = f" of block {position}" if len(system.blocks) > 1 else ""
-            taken.take(f"rule {index}{of_block}", number, rule, block)
-    rules = both = None
-    if taken.rules:
+    sides, answers = _within(system, domain)
+    shapes = {
+        (v.name, t.name): shape
+        for v in system.variables
+        for t in v.terms
+        if not (v.parts and v.clips) and (shape := _shape(t)) is not None
+    }
+    curves = dict(_curves(system, sides, shapes))
+    answers += _of_terms(system, shapes, curves, sides)
+    known = rules_of(system)
+    left, kept = [*known.left_out], list[BaseRule]()
+    for rule in known.rules:
+        if len(rule.literals) > 1 and rule.norm != conjunction:
+            text = f"its 'and' is the {rule.norm}, and that of most rules is another"
+            name = rule.name.partition(" of ")[2] if "way " in rule.name else rule.name
+            left.append(LeftOut(name, rule.number, "FTD01", text))
+    numbers = {one.number for one in left}
+    kept = [rule for rule in known.rules if rule.number not in numbers]
+    answers += (
+        _declined("FTD07", f"the activation of block {position}", why)
+        for position, block in enumerate(system.blocks, 1)
+        if block.activation.method != "general"
+        for why in [f"it is {block.activation.method!r}; only conditions are audited"]
+    )
+    once = {one.number: one for one in left}
+    answers += (_declined(one.code, one.name, one.reason) for one in once.values())
+    proof = Proved("read off the rule; no input was needed")
+    answers += (
+        audit_answer(f"FT101.{why}", name, proof) for name, _, why in known.silent
+    )
+    rules = None
+    asked = [one for rule in kept for one in map(_readable, rule.when)]
+    made = dict.fromkeys((one.variable, term) for one in asked for term in one.terms)
+    made |= {(v.name, t.name): None for v in system.variables for t in v.terms}
+    if kept:
         rules = RuleBase(
             system.name,
-            tuple(dict.fromkeys(rule.then for rule in taken.rules)),
-            tuple(terms.variable(one) for one in system.variables),
-            tuple(taken.rules),
+            tuple(dict.fromkeys(rule.then for rule in kept)),
+            tuple(_named(one, shapes, made) for one in system.variables),
+            tuple(Rule(tuple(map(_readable, rule.when)), rule.then) for rule in kept),
             Semantics(conjunction),
         )
-        both = bounded_rules(
-            rules, taken.weights, {**terms.bounds, **terms.hedged_terms}, ranges
-        )
+    absent = [(one.name, one.number) for one in once.values()]
+    absent += [(name, number) for name, number, _ in known.silent]
     return AuditView(
         rules,
+        tuple(kept),
         Policy(conjunction, "all"),
         sides,
         system=system,
-        rule_names=tuple(taken.rule_names),
-        numbers=tuple(taken.numbers),
-        declined=tuple(taken.answers),
-        left_out=taken.left_out,
-        is_whole=taken.is_whole,
-        bounds=both,
+        rule_names=tuple(rule.name for rule in kept),
+        numbers=tuple(rule.number for rule in kept),
+        declined=tuple(answers),
+        left_out=dict(absent),
+        is_whole=not left,
+        curves=curves,
+        inexact=frozenset(made.keys() - shapes.keys()),
     )
 
 
@@ -175,83 +192,98 @@ def _declined(code: str, subject: str, reason: str) -> AuditAnswer:
     return audit_answer("FTD.left-out", subject, Declined(code, reason))
 
 
-class _Taken:
-    """The rules that were taken over so far, and what was left out."""
-
-    def __init__(
-        self, conjunction: Conjunction, terms: SystemTerms, answers: list[AuditAnswer]
-    ) -> None:
-        self.conjunction: Conjunction = conjunction
-        self.terms = terms
-        self.answers = answers
-        self.rules: list[Rule] = []
-        self.weights: list[float] = []
-        self.rule_names: list[str] = []
-        self.numbers: list[int] = []
-        self.left_out: dict[str, int] = {}
-        self.is_whole = True
-
-    def note_activation(self, position: int, block: RuleBlock) -> None:
-        """Note that a block activates only some of the rules that fire."""
-        subject = f"the activation of block {position}"
-        reason = f"it is {block.activation.method!r}; only conditions are audited"
-        self.answers.append(_declined("FTD07", subject, reason))
-
-    def take(self, name: str, number: int, rule: SystemRule, block: RuleBlock) -> None:
-        """Take over a rule, or note why not."""
-        taken = len(self.rules)
-        self._take(name, number, rule, block)
-        if len(self.rules) == taken:
-            self.left_out[name] = number
-
-    def _take(self, name: str, number: int, rule: SystemRule, block: RuleBlock) -> None:
-        if rule.weight == 0.0:
-            self._never("FT101.weight-0", name)
-            return
-        try:
-            if sum(1 for _ in questions(rule.when)) > MOST_QUESTIONS:
-                decline("FTD05", f"it has more than {MOST_QUESTIONS} propositions")
-            if rule.weight != 1.0 and not self.terms.plain:
-                decline("FTD07", "there is no input that its weight could stand for")
-            ways = Conditions(self.conjunction, self.terms, block).ways(rule.when)
-            if rule.weight != 1.0 and self.conjunction == "minimum":
-                self._check_weight(ways)
-        except DecliningError as error:
-            self.is_whole = False
-            self.answers.append(_declined(error.code, name, error.reason))
-            return
-        if not ways:
-            self._never("FT101.never-true", name)
-        for position, way in enumerate(ways, 1):
-            self.rules.append(Rule(way, _text(rule.then)))
-            self.weights.append(rule.weight)
-            self.rule_names.append(
-                name if len(ways) == 1 else f"way {position} of {name}"
-            )
-            self.numbers.append(number)
-
-    def _check_weight(self, ways: Iterable[Way]) -> None:
-        """Refuse a weight on a curve that has no points in its place.
-
-        Raises:
-            DecliningError: If there is one.
-        """
-        for proposition in dict.fromkeys(
-            proposition for way in ways for proposition in way
-        ):
-            for term in proposition.terms:
-                if self.terms.pointed(proposition.variable, term) is None:
-                    where = f"{term!r} of {proposition.variable!r}"
-                    text = f"{where} has no points to be weighted"
-                    decline("FTD07", f"the curve of {text}")
-
-    def _never(self, message: str, name: str) -> None:
-        proof = Proved("read off the rule; no input was needed")
-        self.answers.append(audit_answer(message, name, proof))
+# --- terms
 
 
-def _text(then: Iterable[Conclusion]) -> str:
-    """Return what a rule concludes, as people read it."""
-    return " and ".join(
-        " ".join((one.output, "is", *one.hedges, one.term)) for one in then
+def _shape(term: Term) -> Shape | None:
+    """Return the exact shape of a term, with its height; None if there is none."""
+    shape = shape_of(term.function)
+    if shape is None or any(shape.mistakes()):
+        return None
+    if term.height == 1.0:
+        return shape
+    if not isinstance(shape, Points):
+        return None
+    degrees = tuple(degree * term.height for degree in shape.degrees)
+    ratios = (float(a).as_integer_ratio() for a in (*shape.degrees, term.height))
+    *_, by = exact = [Fraction(*ratio) for ratio in ratios]
+    is_exact = all(
+        Fraction(d) == own * by for d, own in zip(degrees, exact[:-1], strict=True)
     )
+    return Points(shape.values, degrees) if is_exact else None
+
+
+def _readable(one: Proposition) -> Proposition:
+    """Return a proposition whose hedges are part of the name of its term."""
+    hedges = one.hedges[one.negated :]
+    terms = tuple(" ".join((*hedges, term)) for term in one.terms)
+    return Proposition(one.variable, terms, ("not",) if one.negated else ())
+
+
+def _named(one: Variable, shapes: dict[Name, Shape], names: Iterable[Name]) -> Variable:
+    """Return an input with some terms; a plateau stands for one without a shape."""
+    terms = tuple(
+        Term(name, shapes.get((of, name), Band()))
+        for of, name in names
+        if of == one.name
+    )
+    return Variable(one.name, terms, one.unit, one.low, one.high, one.parts)
+
+
+def _curves(
+    system: FuzzySystem, domain: Domain, shapes: dict[Name, Shape]
+) -> Iterator[tuple[Name, MembershipFunction]]:
+    """Yield the functions of terms that lines enclose, and that are none."""
+    for one in system.variables:
+        names = [part.input for part in one.parts] or [one.name]
+        if any(domain.side(name) is None for name in names) or (
+            one.parts and one.clips
+        ):
+            continue
+        for term in one.terms:
+            shape = shape_of(term.function)
+            is_wrong = shape is not None and any(shape.mistakes())
+            is_free = isinstance(term.function, Formula | Linear) or is_wrong
+            if (one.name, term.name) not in shapes and not is_free:
+                yield (one.name, term.name), Hedged(term.function, term.height, ())
+
+
+def _of_terms(
+    system: FuzzySystem,
+    shapes: dict[Name, Shape],
+    curves: dict[Name, MembershipFunction],
+    domain: Domain,
+) -> Iterator[AuditAnswer]:
+    """Yield what becomes of terms without an exact shape, and why."""
+    uses = Counter(
+        key
+        for rule in system.rules
+        for key in {(one.variable, one.term) for one in questions(rule.when)}
+    )
+    for one in system.variables:
+        for term in one.terms:
+            key = one.name, term.name
+            if key in shapes:
+                continue
+            message, facts = "FTD.left-out", dict[str, float]()
+            reason = f"its curve ({term.function.__struct_config__.tag}) has no exact"
+            reason += " method"
+            if one.parts and one.clips:
+                reason = "a combination that is moved into a range has no exact method"
+            if key in curves:
+                message = "FTD.bounded"
+                reason += "; its shape and its overlaps are not checked"
+                both = function_lines(curves[key], *span(one, domain))
+                pairs = zip(both.lower.at, both.upper.at, strict=True)
+                apart = max((high - low for low, high in pairs), default=Fraction(0))
+                facts = {"apart": outwards(apart)[1]}
+            count = uses[key]
+            few = {0: "no rule uses it", 1: "1 rule uses it"}
+            reason += f"; {few.get(count, f'{count} rules use it')}"
+            yield audit_answer(
+                message,
+                f"term {term.name!r} of {one.name!r}",
+                Declined("FTD02", reason),
+                terms=(TermName(*key),),
+                facts=facts,
+            )

@@ -122,7 +122,7 @@ def test_levels_alone_decide_lines() -> None:
         base = Base.of(*random_base(seed))
         solver = Solver(base, z3)
         for question in questions(base, seed)[::3]:
-            answer = by_levels(base, question, Budget())
+            answer = by_levels(base, question, None, Budget())
             other = solver.ask(question, Budget())
             assert type(answer) is type(other), (seed, question, answer, other)
 
@@ -139,7 +139,7 @@ def test_a_step_beside_a_slope_lets_a_rule_win() -> None:
     )
     model = RuleBase("step", ("a", "b", "c"), (Variable("x0", terms),), rules)
     base = Base.of(model, Domain((DomainSide("x0", 0.0, 4.0),)))
-    answer = by_levels(base, Question((0,), (1, 2, 4)), Budget())
+    answer = by_levels(base, Question((0,), (1, 2, 4)), None, Budget())
     assert isinstance(answer, Point)
     assert answer.values["x0"] <= Fraction(0.8)
 

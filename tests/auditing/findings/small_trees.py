@@ -6,10 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.decide import Budget
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.findings.records import AuditSettings, Policy
+from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
+from fuzzytree.auditing.findings.subject import subject_of as ready
+from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.rulebase import (
     Band,
     Conjunction,
@@ -108,7 +110,7 @@ def subject_of(
     *,
     limits: Mapping[str, tuple[float, float]] | None = None,
     rows: list[list[float]] | None = None,
-    clock: Clock | None = None,
+    budget: Budget | None = None,
 ) -> Subject:
     """Return a model as it is audited, on [0, 1] for each input unless limited.
 
@@ -116,20 +118,12 @@ def subject_of(
         model: The model.
         limits: Other limits.
         rows: A list of values for each row.
-        clock: How much time there is.
+        budget: How many steps there are.
     """
     rules = rules_from_tree(model) if isinstance(model, FuzzyTree) else model
     ends = dict.fromkeys(rules.inputs, (0.0, 1.0)) | dict(limits or {})
-    semantics = rules.semantics
-    return Subject(
-        rules=rules,
-        policy=Policy(semantics.conjunction, "strongest", semantics.uncovered),
-        domain=Domain(tuple(DomainSide(name, *of) for name, of in ends.items())),
-        settings=AuditSettings(),
-        clock=clock or Clock(),
-        tree=model if isinstance(model, FuzzyTree) else None,
-        raw=rules_from_tree(model, "raw")
-        if isinstance(model, FuzzyTree) and model.sets
-        else None,
-        rows=None if rows is None else AuditRows("rows", np.array(rows, dtype=float).T),
-    )
+    domain = Domain(tuple(DomainSide(name, *of) for name, of in ends.items()))
+    table = None
+    if rows is not None:
+        table = AuditRows("rows", np.array(rows, dtype=float).T)
+    return ready(view(model, domain), AuditSettings(), budget, table)

@@ -43,11 +43,11 @@ def test_a_whole_configuration_is_read() -> None:
         select=("FT1", "FT301"),
         skip=("FT103",),
         limits=(LimitsOfFile(variable="force", from_=1.0, to=5.5),),
-        settings=SettingsOfFile(epsilon=0.2, budget_s=120.0, rows=10),
+        settings=SettingsOfFile(epsilon=0.2, budget=120.0, rows=10),
         baseline="accepted.json",
         fail_on="error",
     )
-    settings = AuditSettings(epsilon=0.2, budget_s=120.0, rows=10)
+    settings = AuditSettings(epsilon=0.2, budget=120.0, rows=10)
     assert whole.audit_settings == settings
 
 
@@ -72,7 +72,8 @@ def test_an_empty_mapping_changes_nothing() -> None:
         (
             b"settings: {epsilon: 2, budget: 0}\n",
             "x.yaml:1:21: epsilon must be above 0 and at most 1, not 2.0\n"
-            "x.yaml:1:32: the budget must be above 0 and at most 1e9 seconds, not 0.0",
+            "x.yaml:1:32: budget must be above 0 and at most 1e9 million steps, "
+            "not 0.0",
         ),
         (
             b"limits:\n"

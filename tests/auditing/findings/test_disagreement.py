@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import pytest
 
+from fuzzytree.auditing.decide import Budget
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -15,7 +16,6 @@ from fuzzytree.auditing.engine.states import (
     percent,
     point_of,
 )
-from fuzzytree.auditing.findings import rows as rows_module
 from fuzzytree.auditing.findings.disagreement import (
     TreeAndRules,
     answers,
@@ -90,12 +90,9 @@ def test_the_nearest_disagreement_to_a_row_is_bounded_on_both_sides() -> None:
 
 
 @pytest.mark.parametrize("steps", [1, 200, 400, 700, 1200])
-def test_a_budget_that_ends_certifies_no_more_than_was_tested(
-    steps: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(rows_module, "STEPS", steps)
-    subject = subject_of(one_cut(0.25), rows=[[0.1], [0.6], [0.8]])
-    results = [*answers(subject)]
+def test_a_budget_that_ends_certifies_no_more_than_was_tested(steps: int) -> None:
+    rows, budget = [[0.1], [0.6], [0.8]], Budget(steps)
+    results = [*answers(subject_of(one_cut(0.25), rows=rows, budget=budget))]
     near = next(one for one in results if one.subject == "rows")
     queries = _number(near, "rows evaluated")
     assert [one.state for one in results[results.index(near) + 1 :]] == (
@@ -147,7 +144,7 @@ def _sampled(seed: int, points: int) -> None:
         reach[name] = 3.0 * max(cuts, default=1.0)
     limits = {name: (-r, r) for name, r in reach.items()}
     rows = [[draw.uniform(-r, r) for r in reach.values()] for _ in range(3)]
-    subject = subject_of(tree, limits=limits, rows=rows)
+    subject = subject_of(tree, limits=limits, rows=rows, budget=Budget(20_000_000))
     results = [*answers(subject)]
     differing = {one.rules[0] for one in results if one.is_finding}
     assert subject.raw is not None

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings.gaps import answers
-from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, Policy
-from fuzzytree.auditing.findings.subject import AuditRows, Subject
+from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
+from fuzzytree.auditing.findings.subject import AuditRows, subject_of
+from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.rulebase import (
     Points,
     Proposition,
@@ -38,16 +39,8 @@ def _asked(
     semantics = Semantics(uncovered=uncovered)
     base = RuleBase("b", ("a", "b"), (Variable("x", terms),), rules, semantics)
     box = Domain((DomainSide("x", 0.0, 4.0),))
-    policy = Policy("minimum", "strongest", uncovered)
-    subject = Subject(
-        rules=base,
-        policy=policy,
-        domain=box,
-        settings=AuditSettings(),
-        clock=Clock(),
-        rows=rows,
-        is_whole=is_whole,
-    )
+    viewed = replace(view(base, box), is_whole=is_whole)
+    subject = subject_of(viewed, AuditSettings(), rows=rows)
     return [*answers(subject)]
 
 

@@ -238,7 +238,7 @@ def test_both_ways_of_a_rule_stand_where_it_does_and_have_its_number(
         lines = {17 + audit.numbers[number - 1] for number in answer.rules}
         assert {place.line for place in answer.places} == lines
     shown = "\n".join(audit_lines(audit, is_whole=True))
-    assert "rules 1, 2 fire with strength 0.5 or more" in shown
+    assert "rules 1, 2 fire with strength 1 or more" in shown
     assert "rules 2, 3" not in shown
     plain = WAYS.replace("food is good or service is good", "food is good")
     path.write_text(plain)

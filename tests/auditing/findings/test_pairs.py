@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from fractions import Fraction
 
 import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.arrangement import prediction_at
-from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import (
-    Bracket,
     Declined,
     Proved,
     Witness,
@@ -81,7 +78,7 @@ def base(
 def answers_for(
     rules: RuleBase, code: str, settings: AuditSettings | None = None
 ) -> list[AuditAnswer]:
-    settings = settings or AuditSettings(budget_s=600.0)
+    settings = settings or AuditSettings()
     return [
         *audit(
             Material(rules), settings=settings, selection=AuditSelection(select=[code])
@@ -161,7 +158,7 @@ def test_rules_that_never_fire_are_not_reported_as_subsumed() -> None:
     assert answer.measures[-1].value == 1
 
 
-def test_with_inputs_that_depend_on_each_other_nothing_is_ruled_out() -> None:
+def test_with_inputs_that_depend_on_each_other_pairs_are_decided_too() -> None:
     mix = Variable("mix", TERMS, parts=(Part("force", 1.0), Part("slip", 1.0)))
     rules = base(("force is low", "soft"), ("force is high", "soft"))
     rules = replace(
@@ -169,9 +166,10 @@ def test_with_inputs_that_depend_on_each_other_nothing_is_ruled_out() -> None:
         variables=(*rules.variables, mix),
         rules=(*rules.rules, Rule((Proposition("mix", ("high",)),), "soft")),
     )
-    (answer,) = answers_for(rules, "FT104")
-    assert isinstance(answer.state, Declined)
-    assert answer.state.code == "FTD04"
+    assert results(rules, "FT104") == [
+        "rule 2 is subsumed by rule 3: wherever it fires, rule 3 of the same class is "
+        "at least as strong"
+    ]
 
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
@@ -205,12 +203,12 @@ def test_a_rule_behind_one_of_another_class_that_is_as_strong_is_masked(
     ]
 
 
-@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
-def test_the_special_case_that_stands_first_is_not_masked(
-    conjunction: Conjunction,
-) -> None:
+def test_the_special_case_that_stands_first_is_not_masked() -> None:
     special = ("force is high, slip is high, force is low", "soft")
-    assert not results(base(special, *CLEAN, conjunction=conjunction), "FT105")
+    assert not results(base(special, *CLEAN), "FT105")
+    # Its product is smaller wherever it fires: `low` is below 1 where `high` is not 0.
+    (weaker,) = results(base(special, *CLEAN, conjunction="product"), "FT105")
+    assert weaker.endswith("rule 3 of class 'hard' is stronger")
 
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
@@ -228,7 +226,7 @@ def test_a_rule_before_a_stronger_one_is_masked(conjunction: Conjunction) -> Non
     ]
 
 
-def test_a_rule_that_only_comes_near_a_stronger_one_is_not_called_unmasked() -> None:
+def test_a_rule_that_comes_near_a_stronger_one_only_at_0_is_never_answered() -> None:
     # The first is `down` times the second: it comes near it at 0, where both are 0.
     rules = base(
         ("force is up, force is down", "soft"),
@@ -236,12 +234,10 @@ def test_a_rule_that_only_comes_near_a_stronger_one_is_not_called_unmasked() -> 
         conjunction="product",
         more=(UP, DOWN),
     )
-    (answer,) = answers_for(rules, "FT105")
-    assert isinstance(answer.state, Declined)
-    assert answer.sentence == (
-        "no rule is shown to be masked, among 1 pair of two classes: 1 pair of "
-        "strengths are too near to compare"
-    )
+    assert results(rules, "FT105") == [
+        "rule 1 is never answered: wherever it fires, rule 2 of class 'hard' is "
+        "stronger"
+    ]
 
 
 def test_a_rule_that_ties_somewhere_before_the_other_is_answered_there() -> None:
@@ -344,7 +340,7 @@ def test_two_small_distances_under_the_product_are_left_open() -> None:
 # --- FT201
 
 
-def test_a_conflict_is_reported_with_its_highest_level_and_a_region() -> None:
+def test_a_conflict_is_reported_with_its_highest_level() -> None:
     rules = base(*CLEAN, ("slip is wide", "soft"))
     (first,) = [one for one in answers_for(rules, "FT201") if one.rules == (2, 3)]
     assert first.sentence == (
@@ -352,9 +348,6 @@ def test_a_conflict_is_reported_with_its_highest_level_and_a_region() -> None:
         "and say 'hard' and 'soft'"
     )
     assert isinstance(first.state, Witness)
-    assert [one.variable for one in first.region] == ["force", "slip"]
-    for span in first.region:
-        assert (span.low, span.high) == pytest.approx((3.0, 4.0), abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -534,7 +527,6 @@ def test_a_proposition_that_a_rule_of_the_class_makes_irrelevant_is_proved() -> 
     rules = base(("force is wide", "hard"), ("force is high, slip is low", "hard"))
     (answer,) = [one for one in answers_for(rules, "FT107") if "slip" in one.subject]
     assert isinstance(answer.state, Proved)
-    assert answer.state.how == "rule 1 of the same class is as strong everywhere"
 
 
 def test_many_propositions_that_matter_are_reported_up_to_a_number_and_counted(
@@ -548,11 +540,10 @@ def test_many_propositions_that_matter_are_reported_up_to_a_number_and_counted(
 
 def test_what_a_spent_budget_leaves_open_is_a_bracket_or_cut_short() -> None:
     rules = random_base(2, 4, 2, kind="points", odd=0.2, combinations=1)
-    moments = itertools.count()
     made = audit(
         Material(rules),
-        clock=Clock(1.0, now=lambda: next(moments) / 20.0),
+        settings=AuditSettings(budget=0.005),
         selection=AuditSelection(select=["FT107"]),
     )
     states = {type(one.state) for one in made.answers}
-    assert not made.is_complete or Bracket in states
+    assert not made.is_complete or Declined in states

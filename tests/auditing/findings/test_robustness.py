@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
+from fuzzytree.auditing.decide import Budget
 from fuzzytree.auditing.decide.costs import Costs
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness, point_of
-from fuzzytree.auditing.findings import rows as rows_module
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.robustness import (
     RowDecider,
@@ -150,12 +150,9 @@ def test_without_rows_it_is_declined() -> None:
     assert results.state == Declined("FTD06", "rows are needed (--data TABLE)")
 
 
-def test_a_budget_that_ends_keeps_the_rows_that_were_tested(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(rows_module, "STEPS", 5)
+def test_a_budget_that_ends_keeps_the_rows_that_were_tested() -> None:
     rows = [[number / 10] for number in range(1, 9)]
-    results = [*answers(subject_of(one_cut(), rows=rows))]
+    results = [*answers(subject_of(one_cut(), rows=rows, budget=Budget(5)))]
     count = int(_number(results[0], "rows evaluated"))
     assert 0 < count < 8
     assert results[-1].sentence == f"{8 - count} more rows are not evaluated"

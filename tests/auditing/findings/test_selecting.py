@@ -73,9 +73,9 @@ def test_a_wrong_setting_is_one_sentence(texts: dict[str, str], message: str) ->
 
 @pytest.mark.parametrize("budget", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_budget_of_nothing_or_without_end_is_refused(budget: float) -> None:
-    message = f"the budget must be above 0 and at most 1e9 seconds, not {budget!r}"
+    message = f"budget must be above 0 and at most 1e9 million steps, not {budget!r}"
     with pytest.raises(ValueError, match=r".") as caught:
-        check_settings(AuditSettings(budget_s=budget))
+        check_settings(AuditSettings(budget=budget))
     assert str(caught.value) == message
 
 

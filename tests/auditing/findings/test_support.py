@@ -6,15 +6,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from msgspec.structs import asdict, replace
+from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+from fuzzytree.auditing.decide import Budget, OutOfStepsError
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings import support
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
+from fuzzytree.auditing.findings.subject import subject_of as ready
 from fuzzytree.auditing.findings.support import (
     answers,
     count_rows,
@@ -59,10 +60,7 @@ def subject_of(
     settings: AuditSettings | None = None,
 ) -> Subject:
     found = view(model, domain_of(model))
-    assert found.rules is not None
-    facts = asdict(found)
-    settings = settings or AuditSettings(rows=500)
-    return Subject(**facts, settings=settings, clock=Clock(), rows=rows)
+    return ready(found, settings or AuditSettings(rows=500), rows=rows)
 
 
 def queries(subject: Subject) -> dict[str, AuditAnswer]:
@@ -284,7 +282,7 @@ def test_of_a_system_only_firing_is_counted_and_gaps_only_if_it_is_whole() -> No
     )
 
 
-def test_counts_for_a_bounded_curve_are_reported_where_both_bounds_agree() -> None:
+def test_counts_for_a_curve_between_lines_are_exact() -> None:
     system = system_of(block_of(A_LOW), low=SCurve(0.0, 4.0))
     clear, near = (
         np.array([[0.0, 3.0], [0.0, 0.0]]),
@@ -294,22 +292,13 @@ def test_counts_for_a_bounded_curve_are_reported_where_both_bounds_agree() -> No
     assert found["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
     assert found["uncovered rows"].sentence == "on 1 of 2 rows no rule fires"
     found = queries(subject_of(system, AuditRows("pump", near)))
-    assert found["rule 1"].sentence == (
-        "on how many rows rule 1 fires is not decided: it fires on 1 of 2 at least, "
-        "and on 2 at most"
-    )
-    assert found["uncovered rows"].sentence == (
-        "the number of uncovered rows is not known: there are 0 at least, and 1 at most"
-    )
-    assert all(
-        isinstance(found[name].state, Declined) for name in ("rule 1", "uncovered rows")
-    )
+    assert found["rule 1"].sentence == "rule 1 fires on 2 of 2 rows"
+    assert found["uncovered rows"].sentence == "on 0 of 2 rows no rule fires"
 
 
 def test_a_spent_budget_stops_the_count() -> None:
-    clock = Clock(1.0, now=iter([0.0, 2.0, 2.0]).__next__)
-    with pytest.raises(OutOfTimeError):
-        count_rows(replace(subject_of(RULES), clock=clock), FORCES)
+    with pytest.raises(OutOfStepsError):
+        count_rows(replace(subject_of(RULES), budget=Budget(1)), FORCES)
 
 
 def test_of_a_model_of_many_propositions_fewer_points_are_drawn(

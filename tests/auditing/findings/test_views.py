@@ -9,10 +9,11 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
+from fuzzytree.auditing.decide.rules import MOST_QUESTIONS, MOST_WAYS
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.subject import AuditView
-from fuzzytree.auditing.findings.system_conditions import MOST_QUESTIONS, MOST_WAYS
+from fuzzytree.auditing.findings.records import AuditSettings
+from fuzzytree.auditing.findings.subject import AuditView, subject_of
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model import (
     Activation,
@@ -38,7 +39,6 @@ from fuzzytree.model import (
     Variable,
 )
 from fuzzytree.model.rulebase import sentence
-from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.semantics import as_system
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -88,13 +88,10 @@ def activations(system: FuzzySystem, values: Sequence[float]) -> list[float]:
 
 def strengths(found: AuditView, values: Sequence[float]) -> list[Fraction]:
     """Return the strength of each rule in the model: of its strongest way."""
-    assert found.rules is not None
     row = dict(zip(BOX_INPUTS, values, strict=True))
-    best = [Fraction(0)] * max(found.numbers)
-    answer = exact_answer(found.rules, row).strengths
-    for number, strength in zip(found.numbers, answer, strict=True):
-        best[number - 1] = max(best[number - 1], strength)
-    return best
+    low, high = both_strengths(found, row)
+    assert low == high
+    return [low.get(n, Fraction(0)) for n in range(1, max(found.numbers) + 1)]
 
 
 CONDITIONS: tuple[Condition | None, ...] = (
@@ -214,10 +211,10 @@ def test_a_curve_without_an_exact_method_is_reported_with_its_rules() -> None:
     found = view(system, BOX)
     assert len(rules_of(found)) == 2
     assert reasons(found) == [
-        "term 'low' of 'a' is bounded by two lines 0.0011 apart at most: its curve "
+        "term 'low' of 'a' is bounded by two lines 0.00087 apart at most: its curve "
         "(gaussian) has no exact method; its shape and its overlaps are not checked; "
         "1 rule uses it",
-        "term 'low' of 'b' is bounded by two lines 0.0011 apart at most: its curve "
+        "term 'low' of 'b' is bounded by two lines 0.00087 apart at most: its curve "
         "(gaussian) has no exact method; its shape and its overlaps are not checked; "
         "no rule uses it",
     ]
@@ -245,7 +242,7 @@ def test_a_height_is_carried_where_no_degree_is_rounded() -> None:
         one = replace(system.variables[0], terms=(Term("low", curve, height),))
         found = view(replace(system, variables=(one, system.variables[1])), BOX)
         assert found.rules is not None
-        assert (found.bounds is not None) is (expected is None)
+        assert (("a", "low") in found.inexact) is (expected is None)
         if expected is not None:
             assert found.rules.variables[0].terms[0].shape == Points(*expected)
 
@@ -334,15 +331,12 @@ def both_strengths(
     found: AuditView, row: Mapping[str, float]
 ) -> tuple[dict[int, Fraction], dict[int, Fraction]]:
     """Return each rule's strength from below and from above, by its number."""
-    assert found.rules is not None
-    both = (found.rules, found.rules)
-    if found.bounds is not None:
-        both = (found.bounds.lower, found.bounds.upper)
+    base = subject_of(found, AuditSettings()).base
+    point = {name: Fraction(value) for name, value in row.items()}
     made: list[dict[int, Fraction]] = []
-    for rules in both:
+    for side in base.strengths(point):
         best = dict.fromkeys(found.numbers, Fraction(0))
-        exact = exact_answer(rules, row).strengths
-        for number, strength in zip(found.numbers, exact, strict=True):
+        for number, strength in zip(found.numbers, side, strict=True):
             best[number] = max(best[number], strength)
         made.append(best)
     return made[0], made[1]
