@@ -232,9 +232,8 @@ class Search:
 
     def _goal(self) -> float:
         """Return the cost up to which it is to be shown that there is nothing."""
-        if self.high is None:
-            return math.inf
-        return float(self.high * (1 - NARROW))
+        top = self.most if self.high is None else self.high
+        return math.inf if top is None else float(top * (1 - NARROW))
 
     def _cost(self, points: FloatArray) -> FloatArray:
         """Return about what changes to points cost, shape (points,)."""
@@ -307,13 +306,17 @@ class Search:
 
     def _move(self) -> None:
         """Move the best point towards the row as far as it stays of the kind."""
-        for turn in range(_TURNS):
+        is_wide = True
+        for _ in range(_TURNS):
             if self.best is None or self.high is None or self.high <= LEAST:
                 return
             best = np.array([float(self.best[name]) for name in self.field.inputs])
-            is_wide = turn < _TURNS // 3
-            if not self._best_of(self._moves(best, is_wide=is_wide)) and not is_wide:
-                return
+            before = self.high
+            self._best_of(self._moves(best, is_wide=is_wide))
+            if self.high > before * (1 - NARROW / 8):
+                if not is_wide:
+                    return
+                is_wide = False
 
     def _moves(self, best: FloatArray, *, is_wide: bool) -> FloatArray:
         """Return points nearer to the row, the same way or with other inputs."""
@@ -398,6 +401,17 @@ class Search:
                 reach = radius / self.rate[n] * (1.0 + 4 * U)
                 slack = 4 * U * (abs(x) + reach)
                 low, high = max(low, x - reach - slack), min(high, x + reach + slack)
+        elif radius < math.inf:
+            x = self.here[n]
+            for sign in (1.0, -1.0):
+                rise, costs = self._range(sign * self._weights[n])
+                reach = float(np.interp(radius, costs, rise)) * (1.0 + 16 * U)
+                reach += 16 * U * (abs(x) + reach)
+                low, high = (
+                    (low, min(high, x + reach))
+                    if sign > 0.0
+                    else (max(low, x - reach), high)
+                )
         if low > high:
             return []
         both = np.array([low, high])

@@ -12,6 +12,7 @@ from fuzzytree.auditing.decide.answers import Proved as NoPoint
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.contest import Contest, decided
 from fuzzytree.auditing.decide.costs import Costs, Nearest
+from fuzzytree.auditing.decide.nearest import nearest
 from fuzzytree.auditing.decide.polytopes import Leaves
 from fuzzytree.auditing.decide.search import Search
 from fuzzytree.auditing.engine.domain import Domain, contains
@@ -46,7 +47,10 @@ MOST_ROWS = 2000
 _PART = 0.9  # of the steps, to seek; the rest is for other codes
 _LEAF_PART = 0.25  # of the steps that are left, for one leaf
 
+_HINTS = 16  # rows from which a point where both differ is sought at first
+
 _Row = tuple[int, dict[str, Fraction]]
+_Point = Mapping[str, Fraction]
 
 
 class TreeAndRules:
@@ -183,18 +187,20 @@ class _Rows:
 
         `points`: where both differ; the rows that are nearest to one come first.
         """
-        costs = self.both.costs
-        order: list[tuple[Fraction, int]] = []
+        costs, leaves = self.both.costs, self.both.leaves
+        order: list[tuple[float, int]] = []
         for place, (number, row) in enumerate(self.rows):
-            pairs = [(costs.distance(row, point), point) for point in points]
-            away, point = min(
-                pairs, key=lambda pair: pair[0], default=(Fraction(1), None)
-            )
-            order.append((away, place))
-            high = None if self.best is None else self.best.high
-            if point is not None and (high is None or away < high):
-                self.best, self.row = Nearest(away, away, dict(point)), number
-        for _, place in sorted(order):
+            self._hint(number, row, points)
+            chosen = leaves.chosen(leaves.decided(row)[0], None)
+            bounds = leaves.parts.bounds(row, costs)
+            order.append((min((bounds[n] for n in chosen), default=1.0), place))
+        order.sort()
+        for _, place in order[:_HINTS]:  # just beyond a cut both may differ
+            number, row = self.rows[place]
+            beyond = nearest(leaves, row, budget=self.budget).point
+            if beyond is not None and self.both.differ(beyond):
+                self._hint(number, row, [beyond])
+        for _, place in order:
             if self.budget.is_spent:
                 self.why = self.why or "the budget was spent"
                 return
@@ -212,6 +218,19 @@ class _Rows:
             if result.point is not None:
                 self.best, self.row = result, number
             self.count += 1
+
+    def _hint(
+        self,
+        number: int,
+        row: Mapping[str, Fraction],
+        points: Sequence[Mapping[str, Fraction]],
+    ) -> None:
+        """Keep a point at which both differ, if it is nearer than the best."""
+        for point in points:
+            away = self.both.costs.distance(row, point)
+            high = None if self.best is None else self.best.high
+            if high is None or away < high:
+                self.best, self.row = Nearest(away, away, dict(point)), number
 
 
 def _nearest_answer(

@@ -18,7 +18,13 @@ from fuzzytree.model import Conjunction, FuzzyTree
 from fuzzytree.testing import random_tree
 from tests.auditing.decide.bases import Kind, random_base
 
-POINTS = 250
+POINTS = 120
+
+
+def some_seeds(count: int, quick: int = 1) -> list[object]:
+    """Return seeds, all but the first few of which are for the long run."""
+    heavy = [pytest.param(n, marks=pytest.mark.heavy) for n in range(quick, count)]
+    return [*range(quick), *heavy]
 
 
 def draw_value(side: DomainSide, chance: random.Random) -> Fraction:
@@ -94,12 +100,12 @@ def check(
     [
         ("steps", "minimum", 0),
         ("categories", "minimum", 0),
-        ("steps", "product", 0),
-        ("curves", "minimum", 0),
-        ("steps", "minimum", 2),
+        pytest.param("steps", "product", 0, marks=pytest.mark.heavy),
+        pytest.param("curves", "minimum", 0, marks=pytest.mark.heavy),
+        pytest.param("steps", "minimum", 2, marks=pytest.mark.heavy),
     ],
 )
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", some_seeds(4))
 def test_no_cheaper_change_of_rules_exists(
     kind: Kind, conjunction: Conjunction, sums: int, seed: int
 ) -> None:
@@ -130,7 +136,7 @@ def valued(tree: FuzzyTree, seed: int) -> tuple[FuzzyTree, Domain]:
     return tree, Domain(tuple(sides))
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", some_seeds(10, 3))
 def test_no_cheaper_change_of_a_tree_exists(seed: int) -> None:
     tree, domain = valued(
         random_tree(seed, inputs=3, combinations=0.5 * (seed % 2)), seed
@@ -143,7 +149,7 @@ def test_no_cheaper_change_of_a_tree_exists(seed: int) -> None:
         check(leaves, result, row, chance)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", some_seeds(6))
 def test_fixed_columns_stay_and_costs_are_the_unit(seed: int) -> None:
     rules, domain = random_base(seed, "categories")
     base, chance = Base.of(rules, domain), random.Random(seed)
