@@ -285,9 +285,14 @@ def _excesses(of: VariableRange, term: Term, shape: LR) -> Iterator[AuditAnswer 
         if low >= high:
             continue
         x = tuple(low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
-        values = tuple(_polynomial(side.curve, (one - mean) / spread) for one in x)
+        first, step = (low - mean) / spread, (high - low) / spread / _SAMPLES
+        values = tuple(
+            _polynomial(side.curve, first + n * step) for n in range(_SAMPLES + 1)
+        )
         lines = Lines(x, values, values[:-1], values[1:])
         for message, over in (("FT402.above", lines), ("FT402.below", lines.negated())):
+            if max(over.at) <= 1:
+                continue
             cut = combined([over, constant(ONE, low, high)], max)
             runs = itertools.groupby(cut.pieces(), lambda piece: max(piece[2:]) > 1)
             for run in [[*pieces] for is_over, pieces in runs if is_over]:
