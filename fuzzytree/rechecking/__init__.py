@@ -183,15 +183,13 @@ def model_text(model: bytes) -> str:
     if whole.reasons:
         every = (f"{name}: {why}" for name, why in whole.reasons.items())
         raise CannotRunError("; ".join(every))
-    script, variables = Script(), whole.variables.values()
+    script = Script()
     ends = {
         v.name: (Fraction(v.low), Fraction(v.high))
-        for v in variables
+        for v in whole.variables.values()
         if v.low is not None and v.high is not None
     }
-    stand_ins = {v.name: [] if v.missing is None else [v.missing] for v in variables}
-    codes = {v.name: [*map(Fraction, range(len(v.categories)))] for v in variables}
-    script.add(whole, ends, values={n: codes[n] + stand_ins[n] for n in codes})
+    script.add(whole, ends)
     return script.text()
 
 

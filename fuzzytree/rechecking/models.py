@@ -335,9 +335,9 @@ class Model:
             is_fit = block.get("and") == "minimum" or not negated
             is_fit &= negated or block.get("and") == norm
         else:
-            one = self._one_proposition(condition, block, negated=negated)
-            if one is not None:
-                return [(one,)]
+            single = self._one_proposition(condition, block, negated=negated)
+            if single is not None:
+                return [(single,)]
             is_fit = block.get("or") == "maximum" and not (negated and self.is_product)
         if not is_fit:
             norms = f"AND is {block.get('and')} and OR is {block.get('or')}"
@@ -349,7 +349,7 @@ class Model:
             if is_union:
                 result += ways
             else:
-                result = [one + way for one in result for way in ways]
+                result = [start + way for start in result for way in ways]
             if not self.is_product:  # a minimum does not change by repetition
                 result = [tuple(dict.fromkeys(way)) for way in result]
             result = [*dict.fromkeys(result)]
@@ -357,19 +357,19 @@ class Model:
                 raise UndecidedError("a condition that holds in too many ways")
         return result
 
-    def _ways_of_proposition(self, one: Is, *, negated: bool) -> list[Way]:
-        hedges = one.hedges
+    def _ways_of_proposition(self, proposition: Is, *, negated: bool) -> list[Way]:
+        hedges = proposition.hedges
         while hedges[:1] == ("not",):
             negated, hedges = not negated, hedges[1:]
         if hedges[:1] == ("any",):
             return [] if negated else [()]
-        known = self.variables.get(one.variable)
-        if one.others:
+        variable = self.variables.get(proposition.variable)
+        if proposition.others:
             raise CannotRunError("several terms in a proposition of a system")
-        if known is None or one.term not in known.curves:
+        if variable is None or proposition.term not in variable.curves:
             raise UndecidedError("it uses an output")
-        term = "\0".join((one.term, *hedges))
-        return [(Proposition(one.variable, (term,), negated),)]
+        term = "\0".join((proposition.term, *hedges))
+        return [(Proposition(proposition.variable, (term,), negated),)]
 
     def _one_proposition(
         self, whole: Joint, block: Facts, *, negated: bool
@@ -388,11 +388,11 @@ class Model:
             return None
         return Proposition(name, tuple(terms), negated)
 
-    def may_conflict(self, one: int, other: int) -> bool:
+    def may_conflict(self, a: int, b: int) -> bool:
         """Return whether two rules of a system say different things of one output."""
         if self.form != "system":
             return True
-        thens = self.thens[one - 1], self.thens[other - 1]
+        thens = self.thens[a - 1], self.thens[b - 1]
         shared = set.intersection(*({c.variable for c in then} for then in thens))
         return any(c.variable in shared for c in {*thens[0]} ^ {*thens[1]})
 
@@ -493,15 +493,15 @@ def _variable(facts: Facts) -> Variable:
 
 
 def _curves(terms: Iterable[Facts]) -> dict[str, Curve]:
-    terms = [{**one} for one in terms]
-    names = [one.pop("name") for one in terms]
+    terms = [{**term} for term in terms]
+    names = [term.pop("name") for term in terms]
     refuse_twice(names)
     return dict(zip(names, map(curve_of, terms), strict=True))
 
 
-def _rule(one: Facts) -> Rule:
-    keys(one, "if, then", "support, probabilities")
-    conditions = [read_condition([text]) for text in one["if"]]
+def _rule(facts: Facts) -> Rule:
+    keys(facts, "if, then", "support, probabilities")
+    conditions = [read_condition([text]) for text in facts["if"]]
     when = [c for c in conditions if isinstance(c, Is) and c.term]
     hedges = {c.hedges for c in when} - {(), ("not",)}
     if len(when) < len(conditions) or hedges:
@@ -509,4 +509,4 @@ def _rule(one: Facts) -> Rule:
     every = [
         Proposition(c.variable, (c.term or "", *c.others), bool(c.hedges)) for c in when
     ]
-    return Rule(tuple(every), one["then"])
+    return Rule(tuple(every), facts["then"])

@@ -131,7 +131,7 @@ class Answer(NamedTuple):
 
     def measure(self, name: str) -> float:
         """Return the value of a measure."""
-        values = [one.value for one in self.measures if one.name == name]
+        values = [m.value for m in self.measures if m.name == name]
         require(len(values) == 1, f"no single measure {name!r}")
         return values[0]
 
@@ -273,20 +273,20 @@ def built(kind: Any, value: Any, where: str) -> Any:
     if kind == State and isinstance(value, dict):
         tag = value.get("state")
         if isinstance(tag, str) and tag in STATES:
-            rest = {key: one for key, one in value.items() if key != "state"}
+            rest = {key: item for key, item in value.items() if key != "state"}
             return built(STATES[tag], rest, where)
     origin, choices = get_origin(kind), get_args(kind)
     if origin is types.UnionType and type(None) in choices:
         return None if value is None else built(choices[0], value, where)
     if origin is tuple and isinstance(value, list):
         every = enumerate(value, 1)
-        return tuple(built(choices[0], one, f"{where} {n}") for n, one in every)
+        return tuple(built(choices[0], item, f"{where} {n}") for n, item in every)
     if origin is Literal and isinstance(value, str) and value in choices:
         return value
     if hasattr(kind, "_fields") and isinstance(value, dict):
         wrong = sorted(value.keys() ^ {*kind._fields})
         if wrong:
-            shown = ", ".join(one if one.isidentifier() else repr(one) for one in wrong)
+            shown = ", ".join(n if n.isidentifier() else repr(n) for n in wrong)
             raise CannotRunError(f"{where}: missing or unknown: {shown:.200}")
         of = _hints(kind)
         return kind(**{n: built(of[n], v, f"{where}, {n}") for n, v in value.items()})

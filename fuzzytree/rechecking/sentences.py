@@ -55,10 +55,10 @@ def sentence_of(answer: Any) -> str:
     state = answer.state
     of_state = ("reason", "hits", "rows")
     facts = {name: getattr(state, name) for name in of_state if hasattr(state, name)}
-    facts |= {one.name: one.value for one in answer.measures}
+    facts |= {m.name: m.value for m in answer.measures}
     region = [
-        (one.variable, one.word) if one.word else (one.variable, one.low, one.high)
-        for one in answer.region
+        (o.variable, o.word) if o.word else (o.variable, o.low, o.high)
+        for o in answer.region
     ]
     facts |= {"subject": answer.subject, "region": region} | {**answer.facts}
     return rendered(answer.message, facts)
@@ -70,7 +70,7 @@ def names_in(message: str) -> set[str]:
     Raises:
         KeyError: If there is no such message.
     """
-    return {one[1] for one in _FIELD.finditer(MESSAGES[message].text)}
+    return {field[1] for field in _FIELD.finditer(MESSAGES[message].text)}
 
 
 def rendered(message: str, facts: Mapping[str, Fact]) -> str:
@@ -86,11 +86,11 @@ def rendered(message: str, facts: Mapping[str, Fact]) -> str:
     """
     template = _PART.sub(
         lambda part: (
-            part[1] if all(one[1] in facts for one in _FIELD.finditer(part[1])) else ""
+            part[1] if all(f[1] in facts for f in _FIELD.finditer(part[1])) else ""
         ),
         MESSAGES[message].text,
     )
-    return _FIELD.sub(lambda one: shown(facts[one[1]], one[2] or ""), template)
+    return _FIELD.sub(lambda field: shown(facts[field[1]], field[2] or ""), template)
 
 
 def shown(fact: Fact, how: str) -> str:
@@ -133,8 +133,8 @@ def _number(fact: float, how: str) -> str:
     if how == "d":
         return f"{fact:.0f}"
     if how.startswith("n "):
-        one, _, many = how[2:].partition("|")
-        return f"{fact:.0f} {one if fact == 1 else many or one + 's'}"
+        single, _, many = how[2:].partition("|")
+        return f"{fact:.0f} {single if fact == 1 else many or single + 's'}"
     return format(fact, how) if how else str(fact)
 
 

@@ -175,7 +175,8 @@ class Script:
             model: The model.
             ends: The values of each variable of which they are known.
             of: What stands before its names, such as `old `.
-            values: Further values of inputs, or the only ones of categories.
+            values: Further values of inputs, or the only ones of categories; those
+                that the model declares unless given.
         """
         self._values |= values
         self.is_product |= model.rules.is_product
@@ -215,36 +216,40 @@ class Script:
 
     # --- variables
 
-    def _add_variable(self, one: Variable, of: str) -> None:
-        if not one.parts and ("input", one.name) in self._symbols:
+    def _add_variable(self, variable: Variable, of: str) -> None:
+        if not variable.parts and ("input", variable.name) in self._symbols:
             return  # of two models
-        own = self.value(one, of)
-        if one.parts:
+        own = self.value(variable, of)
+        if variable.parts:
             parts = (
                 f"(* {self.number(w)} (- {self.symbol(n, 'input')} {self.number(c)}))"
-                for n, w, c in one.parts
+                for n, w, c in variable.parts
             )
             self._lines.append(f"(define-fun {own} () Real (+ 0.0 {' '.join(parts)}))")
         else:
-            unit = f" ; {_plain(one.unit)}" if one.unit else ""
+            unit = f" ; {_plain(variable.unit)}" if variable.unit else ""
             self._lines.append(f"(declare-const {own} Real){unit}")
-        self._assert_values(one, own)
+        self._assert_values(variable, own)
 
-    def value(self, one: Variable, of: str = "") -> str:
+    def value(self, variable: Variable, of: str = "") -> str:
         """Return the symbol of a variable's value."""
-        return self.symbol(f"{of}{one.name}" if one.parts else one.name, "input")
+        return self.symbol(
+            f"{of}{variable.name}" if variable.parts else variable.name, "input"
+        )
 
-    def _assert_values(self, one: Variable, own: str) -> None:
+    def _assert_values(self, variable: Variable, own: str) -> None:
         """Assert the values that an input can have."""
         formulas, names = list[str](), ""
-        low, high = self._ends.get(one.name, (None, None))
-        if one.categories:
-            names = f" ; {_plain(', '.join(one.categories))}"
+        low, high = self._ends.get(variable.name, (None, None))
+        if variable.categories:
+            names = f" ; {_plain(', '.join(variable.categories))}"
         elif low is not None and high is not None:
             ends = f"(<= {self.number(low)} {own}) (<= {own} {self.number(high)})"
             formulas = [f"(and {ends})"]
-        codes = [Fraction(code) for code in range(len(one.categories))]
-        for value in self._values.get(one.name, codes):
+        values = [*map(Fraction, range(len(variable.categories)))]
+        if variable.missing is not None and (values or formulas):
+            values.append(variable.missing)
+        for value in self._values.get(variable.name, values):
             formulas.append(f"(= {own} {self.number(value)})")
         if formulas:
             self._lines.append(f"(assert {any_of(formulas)}){names}")
@@ -261,11 +266,11 @@ class Script:
                 self._define(name, lines_of(curve, ZERO, ONE)[0])
                 self._terms[key] = f"({self.symbol(name)} {own})"
             else:  # of two models the same curve is one unknown
-                one = own, curve
-                if one not in self._unknowns:
+                place = own, curve
+                if place not in self._unknowns:
                     text = self._enclose(variable, curve, name, own)
-                    self._unknowns[one] = text
-                self._terms[key] = self._unknowns[one]
+                    self._unknowns[place] = text
+                self._terms[key] = self._unknowns[place]
         return self._terms[key]
 
     def _enclose(self, variable: Variable, curve: Curve, name: str, own: str) -> str:
@@ -278,8 +283,8 @@ class Script:
             ends = self._region(variable, curve)
             is_positive = variable.name in self._ends and bounds(curve, *ends)[0] > 0
             sides = (", at least", ", at most")
-            for side, one in zip(sides, lines_of(curve, *ends), strict=True):
-                self._define(name + side, one)
+            for side, function in zip(sides, lines_of(curve, *ends), strict=True):
+                self._define(name + side, function)
             low, high = (f"({self.symbol(name + side)} {own})" for side in sides)
             self._lines.append(
                 f"(assert (and (<= {low} {degree}) (<= {degree} {high})))"
@@ -341,32 +346,34 @@ class Script:
         most = self.number(level)
         if rules.is_product:
             return f"({sign} {self.strength(rule, rules)} {most})"
-        degrees = [self._proposition(one, rules, "") for one in rule.when] or ["1.0"]
+        degrees = self._degrees(rule, rules, "")
         return all_of(f"({sign} {degree} {most})" for degree in degrees)
 
     def strength(self, rule: Rule, rules: Rules, of: str = "") -> str:
         """Return how far a rule applies."""
-        degrees = [self._proposition(one, rules, of) for one in rule.when] or ["1.0"]
-        text = degrees[0]
-        for degree in degrees[1:]:
+        text, *rest = self._degrees(rule, rules, of)
+        for degree in rest:
             text = f"({'*' if rules.is_product else 'min'} {text} {degree})"
         return text
 
-    def _proposition(self, one: Proposition, rules: Rules, of: str) -> str:
-        variable = rules.variables[one.variable]
-        degrees = [self.degree(variable, term, of) for term in one.terms]
-        text = degrees[0]
-        for degree in degrees[1:]:
-            text = f"(max {text} {degree})"
-        text = f"(- 1.0 {text})" if one.negated else text
-        return text if one.weight == 1 else f"(* {self.number(one.weight)} {text})"
+    def _degrees(self, rule: Rule, rules: Rules, of: str) -> list[str]:
+        """Return how far each proposition of a rule applies."""
+        result: list[str] = []
+        for name, terms, is_negated, weight in rule.when:
+            variable = rules.variables[name]
+            text, *rest = (self.degree(variable, term, of) for term in terms)
+            for degree in rest:
+                text = f"(max {text} {degree})"
+            text = f"(- 1.0 {text})" if is_negated else text
+            text = text if weight == 1 else f"(* {self.number(weight)} {text})"
+            result.append(text)
+        return result or ["1.0"]
 
-    def on_axes(self, rule: Rule, rules: Rules, of: str = "") -> dict[str, str]:
+    def on_axes(self, rule: Rule, rules: Rules) -> dict[str, str]:
         """Return how far a rule's propositions of each variable apply."""
-        own = {one.variable: rule._replace(when=()) for one in rule.when}
-        for one in rule.when:
-            own[one.variable] = Rule((*own[one.variable].when, one), rule.then)
-        return {name: self.strength(part, rules, of) for name, part in own.items()}
+        names = dict.fromkeys(proposition.variable for proposition in rule.when)
+        own = {n: tuple(p for p in rule.when if p.variable == n) for n in names}
+        return {n: self.strength(Rule(own[n], ""), rules) for n in names}
 
     def add_rule(self, name: str, rule: Rule, rules: Rules, of: str = "") -> str:
         """Add a function that is the strength of a rule, once, and return it."""
@@ -390,17 +397,17 @@ class Script:
         `points`: the variables whose values have none beside them.
         """
         return any_of(
-            self._zero(one, rules.variables[one.variable], one.variable in points, of)
-            for one in rule.when
+            self._zero(p, rules.variables[p.variable], p.variable in points, of)
+            for p in rule.when
         )
 
     def _zero(
-        self, one: Proposition, variable: Variable, is_point: bool, of: str
+        self, proposition: Proposition, variable: Variable, is_point: bool, of: str
     ) -> str:
-        if not one.weight:
+        if not proposition.weight:
             return "true"
-        level, formulas = ONE if one.negated else ZERO, []
-        for term in one.terms:
+        level, formulas = ONE if proposition.negated else ZERO, []
+        for term in proposition.terms:
             degree, curve = self.degree(variable, term, of), variable.curves[term]
             if is_point or not is_straight(curve):
                 formulas.append(f"(= {degree} {self.number(level)})")
@@ -412,12 +419,12 @@ class Script:
                 self._lines.append(f"{head} {flat})")
             around = self.symbol(name, "zero")
             formulas.append(f"({around} {self.value(variable, of)})")
-        return any_of(formulas) if one.negated else all_of(formulas)
+        return any_of(formulas) if proposition.negated else all_of(formulas)
 
     def _flat(self, function: Lines, level: Fraction) -> Iterator[str]:
         """Yield the open intervals on which a function is at a level."""
         lines, ends, values = function
-        is_flat = [not one.slope and one.degree == level for one in lines]
+        is_flat = [not line.slope and line.degree == level for line in lines]
         sides: list[str] = []
         for place, is_on in enumerate(is_flat):
             if is_on and place == len(ends):

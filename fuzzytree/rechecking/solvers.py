@@ -40,11 +40,11 @@ def script_text(text: str, statements: Sequence[Statement]) -> str:
     return "\n".join([text, *map(_block, statements)])
 
 
-def _block(one: Statement) -> str:
-    said = "".join(c if c.isprintable() else " " for c in one.text)
+def _block(claim: Statement) -> str:
+    text = "".join(c if c.isprintable() else " " for c in claim.text)
     return (
-        f"(push 1) ; {said}: {one.expected} proves it\n"
-        f"(assert {one.formula})\n(check-sat)\n(pop 1)\n"
+        f"(push 1) ; {text}: {claim.expected} proves it\n"
+        f"(assert {claim.formula})\n(check-sat)\n(pop 1)\n"
     )
 
 
@@ -79,13 +79,13 @@ def ask(text: str, statements: Sequence[Statement], program: str = "") -> Result
         return result.strip()
 
     run(text)
-    for one in statements:
+    for claim in statements:
         steps = min(left, STEPS_OF_A_CLAIM)
         if steps <= 0:
             answers.append("unknown")
             continue
         before = _steps(run("(get-info :rlimit)"))
-        reply = run(f"(set-option :rlimit {steps})\n{_block(one)}")
+        reply = run(f"(set-option :rlimit {steps})\n{_block(claim)}")
         left -= _steps(run("(get-info :rlimit)")) - before
         if not _ANSWER.fullmatch(reply):
             raise CannotRunError(f"{name}: it answers {reply!r:.100}")
@@ -118,7 +118,7 @@ def _ask_program(text: str, statements: Sequence[Statement], program: str) -> Re
     except OSError as error:
         raise CannotRunError(f"{path}: {error.strerror or error}") from error
     answers = ran.stdout.split()
-    wrong = [one for one in answers if not _ANSWER.fullmatch(one)]
+    wrong = [a for a in answers if not _ANSWER.fullmatch(a)]
     if wrong or (ran.returncode and len(answers) < len(statements)):
         reply = (
             ran.stdout if wrong else ran.stderr

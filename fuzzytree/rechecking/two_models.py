@@ -52,16 +52,18 @@ def recheck_difference(
     facts: Difference = built(Difference, read_json(diff, names[0]), names[0])
     both = (Case(facts, Model(old, names[1])), Case(facts, Model(new, names[2])))
     report = Report(UNCHECKED, facts.answers)
-    for one, case, content, name in zip(
+    for model, case, content, name in zip(
         (facts.old, facts.new), both, (old, new), names[1:], strict=True
     ):
-        report.expect(one.name == case.model.name, f"the name of {name} is another one")
-        check_source(report, one.file, content, name)
-    is_changed = any(one.is_finding for one in facts.answers)
-    breaks = any(one.grade == "breaking" for one in facts.changes)
+        report.expect(
+            model.name == case.model.name, f"the name of {name} is another one"
+        )
+        check_source(report, model.file, content, name)
+    is_changed = any(o.is_finding for o in facts.answers)
+    breaks = any(o.grade == "breaking" for o in facts.changes)
     sure = [o for o in facts.answers if isinstance(o.state, Proved | Computed)]
-    is_open = any(isinstance(one.state, Bracket | Declined) for one in facts.answers)
-    is_equal = any(one.subject == "decisions" for one in sure) and not is_open
+    is_open = any(isinstance(o.state, Bracket | Declined) for o in facts.answers)
+    is_equal = any(o.subject == "decisions" for o in sure) and not is_open
     verdict = "changed" if is_changed else "equal" if is_equal else "open"
     report.expect(facts.verdict == verdict, f"the verdict is {verdict}")
     is_ok = not is_changed and not breaks
@@ -156,20 +158,20 @@ def _claims(script: Script, both: tuple[Case, Case]) -> Iterator[Statement]:
                 if both[1].then(m) != both[0].then(n)
             ]
             if both[1].rules.uncovered != both[0].then(n) and not is_strict:
-                others.append(all_of(f"(<= {one} 0.0)" for one in new))
+                others.append(all_of(f"(<= {own} 0.0)" for own in new))
             text = f"where old {both[0].name(n)} decides, no new rule decides otherwise"
             if is_strict:
                 text += ", apart from exact ties"
             formula = all_of([way, any_of(others)])
             yield Statement(text, formula, is_sure=is_strict)
-    bare = all_of(f"(<= {one} 0.0)" for one in old)
+    bare = all_of(f"(<= {own} 0.0)" for own in old)
     others = [
         f"(> {new[m - 1]} 0.0)"
         for m in both[1].numbers
         if both[1].then(m) != both[0].rules.uncovered
     ]
     if both[0].rules.uncovered != both[1].rules.uncovered:
-        others.append(all_of(f"(<= {one} 0.0)" for one in new))
+        others.append(all_of(f"(<= {own} 0.0)" for own in new))
     text = "where no old rule fires, no new rule decides otherwise"
     yield Statement(text, all_of([bare, any_of(others)]), is_sure=False)
 
