@@ -143,7 +143,17 @@ def _domain(audit: Audit, case: Case, report: Report) -> None:
 
 def _questions(audit: Audit, case: Case) -> Iterator[str]:
     """Yield what lacks an answer, and is not listed as left out."""
-    codes = {answer.code for answer in case.answers}
+    codes = [answer.code for answer in case.answers]
+    if codes != sorted(codes):
+        yield "the answers are not in the order of their codes"
+    ends = [
+        (answer.repeat, f" --select {answer.facts.get('code', answer.code)}")
+        for answer in case.answers
+    ]
+    starts = {text.removesuffix(end) for text, end in ends}
+    is_same = starts <= {""} or all(text.endswith(end) for text, end in ends)
+    if not is_same or len(starts) > 1:
+        yield "the commands that find it again differ"
     reasons = {text.split(" ")[0]: text for text in audit.unasked}
     if [text.split(" ")[0] for text in audit.unasked] != sorted(reasons):
         yield "the list of what was left out is not in order"
