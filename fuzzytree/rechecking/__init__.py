@@ -14,7 +14,7 @@ Read it in this order: how files become records and models (`records`, `words`, 
 `sentences_of_rules`, `models`); degrees (`curves`); the text for solvers (`smt`);
 what a check needs (`case`); what is claimed (`claims`), who decides it (`solvers`),
 all other checks (`witnesses`, `checks`), and how they end (`outcomes`). `two_models`
-checks what `diff` says; `sentences` are those of an audit.
+checks what `diff` says; `sentences` reads those of an audit from `sentences.toml`.
 """
 
 from __future__ import annotations

@@ -43,8 +43,8 @@ FREE_CODES = {"FT801", "FT802", "FT901", "FTD"}
 UNCHECKED = (
     "the version, the hash of the model's content, the table, how many rows and how "
     "long, how proofs were made, who confirmed them, why something is open or left "
-    "out, ids, the commands, the counts of FT501, the numbers of FT402 and FT403, and "
-    "measures that no sentence shows"
+    "out, ids, the commands, the counts of FT501, the numbers of FT402 and FT403, the "
+    "range of FT401, measures and regions that no sentence shows"
 )
 """What of an audit is read and compared with nothing."""
 
