@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # for tests.*
 from sklearn import datasets
 
 import fuzzytree as ft
-from tests.auditing.engine.bases import Kind, random_base
+from tests.auditing.decide.old_bases import Kind, random_base
 from tests.interop.corpus_fcl import FCL
 from tests.interop.corpus_fis import FIS
 from tests.interop.corpus_fll import FLL

@@ -36,7 +36,7 @@ from fuzzytree.auditing.engine.arrangement import arrange, rule_strengths
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.levels import levels_of
 from fuzzytree.auditing.engine.questions import wins
-from fuzzytree.auditing.engine.states import State
+from fuzzytree.auditing.decide.states import State
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.auditing.findings.subject import Material
@@ -53,7 +53,7 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.numerics.oracle import decide
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
-from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule
+from tests.auditing.decide.old_bases import random_base, unit_domain, with_hidden_rule
 
 BUDGET_S = 2.0  # for one question under the product
 

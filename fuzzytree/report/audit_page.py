@@ -64,7 +64,7 @@ def page(
 
     Example:
         >>> from fuzzytree.auditing.findings.records import Policy, AuditSettings
-        >>> from fuzzytree.auditing.engine.domain import Domain
+        >>> from fuzzytree.auditing.decide.domain import Domain
         >>> from fuzzytree.testing import random_tree
         >>> tree, nothing = random_tree(1), Domain(())
         >>> audit = Audit("0.1", tree.name, "tree", "", None, None, 0,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from fuzzytree import LearningSettings, learn
 from fuzzytree.api.verbs import audited_rows
-from fuzzytree.auditing.engine.states import Computed, Declined, Proved
+from fuzzytree.auditing.decide.states import Computed, Declined, Proved
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import (
     Audit,

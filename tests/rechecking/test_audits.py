@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from fuzzytree import learn, load
-from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.decide import Budget
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import AuditSelection
@@ -39,7 +39,7 @@ from fuzzytree.rechecking.checks import digest_of
 from fuzzytree.rechecking.sentences import LIMITS
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
-from tests.auditing.engine.bases import Kind, random_base
+from tests.auditing.decide.old_bases import Kind, random_base
 from tests.auditing.findings.test_mutations import PLANTED, ROWS, Planted
 from tests.rechecking.audits import audited, small
 
@@ -169,7 +169,7 @@ def test_audits_of_odd_models_hold(seed: int) -> None:
     kinds: tuple[Kind, ...] = ("lr", "points", "band", "mixed")
     kind, sums = chance.choice(kinds), chance.randrange(2)
     model = random_base(seed, 3, 2, norm, kind, shared=0.7, odd=0.5, combinations=sums)
-    text, content = audited(model, clock=Clock(2.0))
+    text, content = audited(model, budget=Budget(4_000_000))
     assert recheck(text, content, ("a.json", "m.yaml")).wrong == []
 
 

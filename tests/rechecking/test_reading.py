@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine import states
+from fuzzytree.auditing.decide import states
 from fuzzytree.auditing.findings.records import LIMITS, Audit, AuditAnswer
 from fuzzytree.exporters import yaml
 from fuzzytree.numerics import decide
@@ -21,7 +21,7 @@ from fuzzytree.rechecking.yaml import read_yaml
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.programs.operations import Doubles
 from fuzzytree.testing import random_system, random_tree
-from tests.auditing.engine.bases import random_base
+from tests.auditing.decide.old_bases import random_base
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -14,7 +14,7 @@ import msgspec
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.auditing.engine.states import Proved
+from fuzzytree.auditing.decide.states import Proved
 from fuzzytree.auditing.findings.audit import audit, smt_text
 from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import Audit, AuditSelection
@@ -37,7 +37,7 @@ from fuzzytree.rechecking.case import strengths
 from fuzzytree.rechecking.models import Model
 from fuzzytree.testing import random_tree
 from tests.auditing.decide.bases import random_base as mixed_base
-from tests.auditing.engine.bases import Kind, random_base, with_hidden_rule
+from tests.auditing.decide.old_bases import Kind, random_base, with_hidden_rule
 from tests.rechecking.audits import grip
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -11,16 +11,16 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
+from fuzzytree.auditing.decide.states import Proved
 from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference
-from fuzzytree.auditing.engine.states import Proved
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.exporters import yaml
 from fuzzytree.model import Document, FuzzySystem
 from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.rechecking import CannotRunError, Report, recheck_difference
 from fuzzytree.rechecking.__main__ import main
-from tests.auditing.engine.bases import random_base
+from tests.auditing.decide.old_bases import random_base
 
 TIPPER = Path(__file__).parents[2] / "examples" / "tipper.fll"
 

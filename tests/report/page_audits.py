@@ -8,8 +8,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Claim,
     Declined,

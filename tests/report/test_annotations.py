@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.decide.states import Declined
 from fuzzytree.report.sarif import annotation_lines
 from tests.report.audits import every_state
 

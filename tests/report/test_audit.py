@@ -6,8 +6,8 @@ import re
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Declined
 from fuzzytree.auditing.findings.records import LIMITS, SourceFile
 from fuzzytree.report.audit import (
     MOST_FINDINGS,

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.states import Declined, Proved
+from fuzzytree.auditing.decide.states import Declined, Proved
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.checking.stability.results import Stability, Trial

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-
 _LOOK = 1_000  # steps between two looks at a budget
 
 ZERO, ONE = Fraction(0), Fraction(1)
@@ -85,11 +83,11 @@ class Question(NamedTuple):
         return self.reach + self.rivals + self.weak
 
 
-class OutOfStepsError(OutOfTimeError):
+class OutOfStepsError(Exception):
     """The budget is spent; what was decided before remains valid."""
 
 
-class Budget(Clock):
+class Budget:
     """How many steps may still be taken: the same answers on any machine and load.
 
     A step is about a microsecond of work.
@@ -139,19 +137,6 @@ class Budget(Clock):
     def check(self) -> None:
         """Spend the steps of a part of some work."""
         self.spend(_LOOK)
-
-    @property
-    def is_over(self) -> bool:
-        """Whether no step is left, after those of the work between two looks."""
-        self.left -= _LOOK
-        if self.whole is not None:
-            self.whole.left -= _LOOK
-        return self.is_spent
-
-    @property
-    def left_s(self) -> float:
-        """About how many seconds are left."""
-        return self.left / 1e6
 
     @property
     def is_spent(self) -> bool:

@@ -18,9 +18,9 @@ from fuzzytree.auditing.decide.axes import (
     Axis,
     literal_bounds,
 )
+from fuzzytree.auditing.decide.domain import Domain, combined
 from fuzzytree.auditing.decide.lines import Lines
 from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, Literal, rules_of
-from fuzzytree.auditing.engine.domain import Domain, combined
 from fuzzytree.model import BoolArray, Document, FloatArray, FuzzySystem, Variable
 
 SAMPLES = 4096
@@ -41,7 +41,7 @@ class Base:
         uncovered: The class where no rule fires.
 
     Example:
-        >>> from fuzzytree.auditing.engine.domain import DomainSide
+        >>> from fuzzytree.auditing.decide.domain import DomainSide
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1)
         >>> box = Domain(tuple(DomainSide(name, -1.0, 1.0) for name in tree.inputs))

@@ -58,7 +58,7 @@ class Claims:
         uncovered: The class where no rule fires, if there is one.
 
     Example:
-        >>> from fuzzytree.auditing.engine.domain import Domain, DomainSide
+        >>> from fuzzytree.auditing.decide.domain import Domain, DomainSide
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1)
         >>> box = Domain(tuple(DomainSide(name, -1.0, 1.0) for name in tree.inputs))

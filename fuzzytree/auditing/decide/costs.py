@@ -13,7 +13,7 @@ from fractions import Fraction
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.answers import ONE, ZERO
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, Point
+from fuzzytree.auditing.decide.domain import Domain, DomainSide, Point
 from fuzzytree.model import Value
 
 NARROW = Fraction(1, 1000)

@@ -33,7 +33,7 @@ class Decider:
     """A base with what its questions have in common.
 
     Example:
-        >>> from fuzzytree.auditing.engine.domain import Domain, DomainSide
+        >>> from fuzzytree.auditing.decide.domain import Domain, DomainSide
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1)
         >>> box = Domain(tuple(DomainSide(name, -1.0, 1.0) for name in tree.inputs))

@@ -18,8 +18,8 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.answers import ONE, ZERO, Budget, OutOfStepsError
 from fuzzytree.auditing.decide.costs import LEAST, NARROW, Costs, Nearest
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.linear import (
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.linear import (
     Row,
     feasible,
     holds,
@@ -27,7 +27,7 @@ from fuzzytree.auditing.engine.linear import (
     least,
     simple,
 )
-from fuzzytree.auditing.engine.regions import boxes, cut_side, leaf_at, regions
+from fuzzytree.auditing.decide.regions import boxes, cut_side, leaf_at, regions
 from fuzzytree.model import FloatArray, FuzzyTree, Variable
 from fuzzytree.numerics import U
 

@@ -24,8 +24,8 @@ from fuzzytree.auditing.decide.answers import (
 from fuzzytree.auditing.decide.contest import Contest
 from fuzzytree.auditing.decide.costs import LEAST, NARROW, Costs, Nearest
 from fuzzytree.auditing.decide.decider import Decider
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.polytopes import Polytopes, polytope_of
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.model import BoolArray, FloatArray
 from fuzzytree.numerics import U, outwards
 

@@ -35,13 +35,13 @@ from fuzzytree.auditing.decide import (
     Proved,
     Question,
     search_boxes,
+    states,
 )
 from fuzzytree.auditing.decide import Literal as Degree
 from fuzzytree.auditing.decide.answers import ONE, ZERO
+from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.decide.rules import Norm
 from fuzzytree.auditing.decide.solver import Solver, solver_for
-from fuzzytree.auditing.engine import states
-from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.model import Band, BoolArray, Points, RuleBase
 
 OF: Final = "the smaller of both margins where the two answer otherwise"

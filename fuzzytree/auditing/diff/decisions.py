@@ -17,11 +17,8 @@ import msgspec
 import numpy as np
 
 from fuzzytree.auditing.decide import Budget, OutOfStepsError
-from fuzzytree.auditing.diff.agreement import Agreement, Prediction
-from fuzzytree.auditing.diff.difference_records import DecisionEvidence
-from fuzzytree.auditing.diff.regions import difference_region
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.domain import Domain, simplified
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Declined,
     Proved,
@@ -31,7 +28,9 @@ from fuzzytree.auditing.engine.states import (
     answer_text,
     point_of,
 )
-from fuzzytree.auditing.engine.witnesses import simplified
+from fuzzytree.auditing.diff.agreement import Agreement, Prediction
+from fuzzytree.auditing.diff.difference_records import DecisionEvidence
+from fuzzytree.auditing.diff.regions import difference_region
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,

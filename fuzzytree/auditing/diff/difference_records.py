@@ -7,8 +7,8 @@ from typing import Final, Literal, NamedTuple, TypeVar
 
 import msgspec
 
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.domain import Domain
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Computed,
     Declined,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import msgspec
 
 from fuzzytree.auditing.decide import Budget
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.diff.decisions import (
     Progress,
     RulePair,
@@ -26,7 +27,6 @@ from fuzzytree.auditing.diff.difference_records import (
 from fuzzytree.auditing.diff.structure import draft_changes
 from fuzzytree.auditing.diff.system_differences import draft_system_changes
 from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import source_of, with_confirmations
 from fuzzytree.auditing.findings.domains import Limits, domain_of, limited
 from fuzzytree.auditing.findings.locations import ModelFile

@@ -10,11 +10,20 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping
+from fractions import Fraction
 from typing import Literal, NamedTuple
 
-from fuzzytree.auditing.engine.pieces import PolynomialPiece, pieces
-from fuzzytree.model import Part, Proposition, Rule, RuleBase, Shape, shapes_of
+from fuzzytree.model import (
+    Part,
+    Points,
+    Proposition,
+    Rule,
+    RuleBase,
+    Shape,
+    shapes_of,
+)
+from fuzzytree.semantics import points_once
 
 How = Literal["same", "class", "curves", "propositions"]
 
@@ -60,25 +69,31 @@ class Curves:
     """Numbers for curves: equal ones for curves of equal degrees everywhere."""
 
     def __init__(self) -> None:
-        self._numbers: dict[tuple[PolynomialPiece, ...], int] = {}
-        self._known: dict[Shape, int] = {}
+        self._numbers: dict[Shape, int] = {}
 
     def number(self, shape: Shape) -> int:
         """Return the number of a curve."""
-        if shape not in self._known:
-            joined = tuple(_joined(pieces(shape)))
-            self._known[shape] = self._numbers.setdefault(joined, len(self._numbers))
-        return self._known[shape]
+        if isinstance(shape, Points):
+            shape = _without_bends(points_once(shape))
+        return self._numbers.setdefault(shape, len(self._numbers))
 
 
-def _joined(laid: Sequence[PolynomialPiece]) -> Iterable[PolynomialPiece]:
-    """Yield pieces, neighbours of one formula as one."""
-    runs = itertools.groupby(laid, lambda piece: (piece.polynomial, piece.cap))
-    for (polynomial, cap), run in runs:
-        first, *rest = run
-        yield PolynomialPiece(
-            first.low, rest[-1].high if rest else first.high, polynomial, cap
-        )
+def _without_bends(points: Points) -> Points:
+    """Return points without those at which the line does not bend."""
+    numbers = (map(Fraction, of) for of in (points.values, points.degrees))
+    pairs = [*zip(*numbers, strict=True)]
+    kept = pairs[:1]
+    for (x, y), (u, v) in itertools.pairwise(pairs[1:]):
+        a, p = kept[-1]
+        if a == x or x == u or (y - p) * (u - x) != (v - y) * (x - a):
+            kept.append((x, y))
+    kept += pairs[1:][-1:]
+    while len(kept) > 1 and kept[0][1] == kept[1][1]:
+        del kept[0]
+    while len(kept) > 1 and kept[-1][1] == kept[-2][1]:
+        del kept[-1]
+    values, degrees = zip(*((float(x), float(y)) for x, y in kept), strict=True)
+    return Points(values, degrees)
 
 
 class RuleKeys:

@@ -11,8 +11,8 @@ from fuzzytree.auditing.decide import Literal
 from fuzzytree.auditing.decide.answers import ZERO
 from fuzzytree.auditing.decide.axes import value_at
 from fuzzytree.auditing.decide.lines import Lines
+from fuzzytree.auditing.decide.states import Span
 from fuzzytree.auditing.diff.agreement import Agreement, Side
-from fuzzytree.auditing.engine.states import Span
 
 _HALVINGS = 60  # of what a region may still grow by
 

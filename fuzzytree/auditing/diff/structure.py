@@ -9,6 +9,9 @@ from fractions import Fraction
 
 import msgspec
 
+from fuzzytree.auditing.decide.domain import Domain, span
+from fuzzytree.auditing.decide.measures import curve_distance
+from fuzzytree.auditing.decide.states import answer_text, listed
 from fuzzytree.auditing.diff.difference_records import Draft, Shown, renamed_model
 from fuzzytree.auditing.diff.matching import (
     AxisKey,
@@ -19,9 +22,6 @@ from fuzzytree.auditing.diff.matching import (
     matching,
     words_of,
 )
-from fuzzytree.auditing.engine.domain import Domain, span
-from fuzzytree.auditing.engine.measures import curve_distance
-from fuzzytree.auditing.engine.states import answer_text, listed
 from fuzzytree.auditing.findings.records import Measure
 from fuzzytree.model import (
     FuzzyTree,

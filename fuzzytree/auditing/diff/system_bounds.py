@@ -13,8 +13,8 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from fuzzytree.auditing.decide import Base
+from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.diff.system_keys import Contribution, contributions, facts_of
-from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.model import (
     Formula,
     FuzzySystem,

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator
 from typing import NamedTuple
 
+from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.diff.matching import Curves
-from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.model import (
     And,
     Condition,

@@ -18,6 +18,14 @@ import msgspec
 import numpy as np
 
 from fuzzytree.auditing.decide import Budget, OutOfStepsError
+from fuzzytree.auditing.decide.domain import Domain, simplified
+from fuzzytree.auditing.decide.states import (
+    Bracket,
+    Declined,
+    Proved,
+    Witness,
+    coordinates,
+)
 from fuzzytree.auditing.diff.decisions import (
     Progress,
     ends_of,
@@ -29,15 +37,6 @@ from fuzzytree.auditing.diff.decisions import (
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.diff.system_bounds import ExactSystem, NotExactError, most
 from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import (
-    Bracket,
-    Declined,
-    Proved,
-    Witness,
-    coordinates,
-)
-from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,

@@ -14,8 +14,8 @@ import msgspec
 
 from fuzzytree.auditing.decide import Budget, OutOfStepsError
 from fuzzytree.auditing.decide.answers import Progress
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import Computed, Declined, Proved, counted
+from fuzzytree.auditing.decide.domain import Domain
+from fuzzytree.auditing.decide.states import Computed, Declined, Proved, counted
 from fuzzytree.auditing.findings.codes import (
     ANSWERED_BY_CONSTRUCTION,
     AUDITED,

@@ -13,7 +13,7 @@ from typing import Final, Literal, TypedDict, Unpack, cast
 
 import msgspec
 
-from fuzzytree.auditing.engine.states import Declined, Span, State
+from fuzzytree.auditing.decide.states import Declined, Span, State
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,
     FactValue,

@@ -8,7 +8,7 @@ from fractions import Fraction
 from fuzzytree.auditing.decide.answers import ONE, ZERO
 from fuzzytree.auditing.decide.lines import combined, constant
 from fuzzytree.auditing.decide.measures import Bounds, integral
-from fuzzytree.auditing.engine.states import Computed
+from fuzzytree.auditing.decide.states import Computed
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject

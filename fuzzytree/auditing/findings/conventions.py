@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Claim,
     Computed,
     Representation,
@@ -68,7 +68,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Compare all forms and runtimes where these usually differ.
 
     Raises:
-        OutOfTimeError: If the budget is spent.
+        OutOfStepsError: If the budget is spent.
     """
     if subject.system is not None:
         yield from _of_system(subject, subject.system)

@@ -9,7 +9,7 @@ from typing import Final
 
 from fuzzytree.auditing.decide import Answer, Open, Point
 from fuzzytree.auditing.decide import Proved as NoPoint
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Claim,
     Proved,

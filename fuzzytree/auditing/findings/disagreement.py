@@ -12,12 +12,12 @@ from fuzzytree.auditing.decide.answers import Proved as NoPoint
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.contest import Contest, decided
 from fuzzytree.auditing.decide.costs import Costs, Nearest
+from fuzzytree.auditing.decide.domain import Domain, contains, simplified
 from fuzzytree.auditing.decide.nearest import nearest
 from fuzzytree.auditing.decide.polytopes import Leaves
+from fuzzytree.auditing.decide.regions import point_in, regions
 from fuzzytree.auditing.decide.search import Search
-from fuzzytree.auditing.engine.domain import Domain, contains
-from fuzzytree.auditing.engine.regions import point_in, regions
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Claim,
     Declined,
@@ -26,7 +26,6 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure

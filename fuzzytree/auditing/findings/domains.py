@@ -10,7 +10,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, whole_side
+from fuzzytree.auditing.decide.domain import Domain, DomainSide, whole_side
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.table_words import read_value
 from fuzzytree.model import (

@@ -16,7 +16,7 @@ from fuzzytree.auditing.decide.cover import (
     gap,
     least_cover,
 )
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Claim,
     Declined,

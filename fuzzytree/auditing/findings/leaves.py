@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.regions import (
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.regions import (
     Interval,
     Region,
     Union,
@@ -17,7 +17,7 @@ from fuzzytree.auditing.engine.regions import (
     point_in,
     regions,
 )
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Claim,
     Declined,
     Proved,

@@ -10,7 +10,7 @@ from typing import Final
 from fuzzytree.auditing.decide import Open
 from fuzzytree.auditing.decide import Proved as NoPoint
 from fuzzytree.auditing.decide.pairs import Common
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Claim,
     Declined,

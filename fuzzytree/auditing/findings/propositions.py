@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from fuzzytree.auditing.decide import Answer, BaseRule, Point
 from fuzzytree.auditing.decide import Proved as NoPoint
 from fuzzytree.auditing.decide.claims import Claims
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Claim,
     Proved,
     State,

@@ -9,8 +9,8 @@ from typing import Final, Literal
 
 import msgspec
 
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import Span, State
+from fuzzytree.auditing.decide.domain import Domain
+from fuzzytree.auditing.decide.states import Span, State
 from fuzzytree.model import Value, summary
 from fuzzytree.rechecking import LIMITS as LIMITS
 from fuzzytree.rechecking import digest_of as digest_of_facts

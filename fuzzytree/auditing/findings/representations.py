@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import Bracket, Computed, Declined, State
+from fuzzytree.auditing.decide.domain import Domain
+from fuzzytree.auditing.decide.states import Bracket, Computed, Declined, State
 from fuzzytree.auditing.findings import conventions
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
@@ -45,7 +45,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Compare all representations of a model with it.
 
     Raises:
-        OutOfTimeError: If the budget is spent.
+        OutOfStepsError: If the budget is spent.
     """
     subject.budget.check()
     values, how = _points(subject)

@@ -10,11 +10,11 @@ from typing import NamedTuple
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.contest import decided
 from fuzzytree.auditing.decide.costs import Nearest
+from fuzzytree.auditing.decide.domain import contains, simplified, variable_value
 from fuzzytree.auditing.decide.nearest import nearest
 from fuzzytree.auditing.decide.polytopes import Leaves
-from fuzzytree.auditing.engine.domain import contains, variable_value
-from fuzzytree.auditing.engine.regions import regions
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.regions import regions
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Claim,
     Declined,
@@ -24,7 +24,6 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure

@@ -10,10 +10,10 @@ import msgspec
 import numpy as np
 
 from fuzzytree.auditing.decide.costs import Costs, Nearest
+from fuzzytree.auditing.decide.domain import Domain, DomainSide, contains
+from fuzzytree.auditing.decide.domain import span as ends_on
 from fuzzytree.auditing.decide.polytopes import Polytopes, polytope_of
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains
-from fuzzytree.auditing.engine.domain import span as ends_on
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Claim,
     Declined,

@@ -11,10 +11,10 @@ import msgspec
 from fuzzytree.auditing.decide import Answer, Base, Budget, Open
 from fuzzytree.auditing.decide import Proved as NoPoint
 from fuzzytree.auditing.decide.claims import Claims
+from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.decide.pairs import Pairs
 from fuzzytree.auditing.decide.rules import BaseRule
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import Declined, Proved, State
+from fuzzytree.auditing.decide.states import Declined, Proved, State
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,
     AuditSettings,

@@ -15,9 +15,8 @@ from typing import Final
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.probes import drawn_values
-from fuzzytree.auditing.engine.states import Declined, Sampled
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Declined, Sampled
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
@@ -450,3 +449,24 @@ def _of_rule(
         measures=tuple(measures),
         facts=facts,
     )
+
+
+def drawn_values(side: DomainSide, shares: FloatArray) -> FloatArray:
+    """Return values of rows, spread evenly as shares from 0 to 1 are.
+
+    Example:
+        >>> from fuzzytree.auditing.decide.domain import DomainSide
+        >>> doors = DomainSide("doors", 1.0, 4.0, is_whole=True)
+        >>> drawn_values(doors, np.array([0.0, 0.3, 0.99])).tolist()
+        [1.0, 2.0, 4.0]
+    """
+    if side.values:
+        values = np.array(side.points)
+        result: FloatArray = values[(shares * len(values)).astype(np.int64)]
+        return result
+    if side.is_whole:
+        result = side.low + np.floor(shares * (side.high - side.low + 1.0))
+        return result
+    result = side.low * (1.0 - shares) + side.high * shares
+    result = np.clip(result, side.low, side.high)
+    return result

@@ -8,8 +8,8 @@ from fractions import Fraction
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import Bracket, Coordinate, Span, Witness
+from fuzzytree.auditing.decide.domain import Domain
+from fuzzytree.auditing.decide.states import Bracket, Coordinate, Span, Witness
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.columns import days_of, placer
 from fuzzytree.model import Variable

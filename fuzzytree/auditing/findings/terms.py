@@ -13,14 +13,13 @@ from typing import Final, NamedTuple
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.decide import measures
+from fuzzytree.auditing.decide import measures, states
 from fuzzytree.auditing.decide.answers import ONE, ZERO
 from fuzzytree.auditing.decide.axes import function_lines
+from fuzzytree.auditing.decide.domain import span
 from fuzzytree.auditing.decide.lines import Between, Lines, combined, constant, lines_of
 from fuzzytree.auditing.decide.measures import Bounds
-from fuzzytree.auditing.engine import states
-from fuzzytree.auditing.engine.domain import span
-from fuzzytree.auditing.engine.states import Bracket, Computed, Proved, State, counted
+from fuzzytree.auditing.decide.states import Bracket, Computed, Proved, State, counted
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject

@@ -15,10 +15,10 @@ from fractions import Fraction
 import msgspec
 
 from fuzzytree.auditing.decide.axes import function_lines
+from fuzzytree.auditing.decide.domain import Domain, DomainSide, span
 from fuzzytree.auditing.decide.lines import Hedged
 from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, rules_of
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, span
-from fuzzytree.auditing.engine.states import Declined, Proved
+from fuzzytree.auditing.decide.states import Declined, Proved
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Policy, TermName
 from fuzzytree.auditing.findings.subject import AuditView, Name

@@ -10,8 +10,8 @@ from fractions import Fraction
 import numpy as np
 
 from fuzzytree.auditing.decide import Question
-from fuzzytree.auditing.engine.domain import DomainSide
-from fuzzytree.auditing.engine.regions import (
+from fuzzytree.auditing.decide.domain import DomainSide
+from fuzzytree.auditing.decide.regions import (
     EVERYWHERE,
     Region,
     Union,

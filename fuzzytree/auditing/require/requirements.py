@@ -10,7 +10,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide import NotBoundedError, scale_of
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.require.claims import (
     Box,
     Claim,

@@ -19,7 +19,7 @@ from fuzzytree.auditing.decide import (
     Point,
     Question,
 )
-from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.require.claims import Verdict
 from fuzzytree.model import Document, FloatArray, FuzzySystem, FuzzyTree
 from fuzzytree.runtimes import baseline, run_system

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from typing import Literal
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.model import (
     LR,
     Band,

@@ -18,9 +18,9 @@ from fuzzytree.auditing.decide import (
     Proved,
     Question,
 )
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.levels import by_levels
 from fuzzytree.auditing.decide.solver import Solver
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.model import (
     Band,
     Conjunction,

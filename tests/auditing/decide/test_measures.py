@@ -42,7 +42,7 @@ from fuzzytree.model import (
     TwoGaussians,
 )
 from fuzzytree.numerics import degree_between, exact_degree
-from tests.auditing.engine.bases import random_shape
+from tests.auditing.decide.old_bases import random_shape
 
 ZERO, ONE = Fraction(0), Fraction(1)
 COARSE = Fraction(1, 100)

@@ -11,9 +11,9 @@ from msgspec.structs import replace
 from fuzzytree.auditing.decide import Base, Budget
 from fuzzytree.auditing.decide.contest import decided
 from fuzzytree.auditing.decide.costs import Costs, Nearest
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.nearest import nearest
 from fuzzytree.auditing.decide.polytopes import Leaves
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.model import Conjunction, FuzzyTree
 from fuzzytree.testing import random_tree
 from tests.auditing.decide.bases import Kind, random_base

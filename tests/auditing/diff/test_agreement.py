@@ -10,10 +10,10 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide import Budget
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Bracket, Proved, State, Witness, point_of
 from fuzzytree.auditing.diff.agreement import OF, Agreement
 from fuzzytree.auditing.diff.regions import difference_region
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.states import Bracket, Proved, State, Witness, point_of
 from fuzzytree.model import (
     Band,
     Conjunction,

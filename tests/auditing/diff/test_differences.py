@@ -14,10 +14,8 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.auditing.decide import Budget
-from fuzzytree.auditing.diff.difference_records import Difference
-from fuzzytree.auditing.diff.differences import difference
-from fuzzytree.auditing.engine.measures import curve_distance
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.measures import curve_distance
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Declined,
     Proved,
@@ -25,6 +23,8 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     point_of,
 )
+from fuzzytree.auditing.diff.difference_records import Difference
+from fuzzytree.auditing.diff.differences import difference
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows

@@ -12,18 +12,18 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide import Budget
-from fuzzytree.auditing.diff.difference_records import Difference
-from fuzzytree.auditing.diff.differences import difference, joined_domain
-from fuzzytree.auditing.diff.matching import Curves
-from fuzzytree.auditing.diff.system_bounds import ExactSystem, NotExactError, most
-from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Declined,
     Proved,
     Witness,
     point_of,
 )
+from fuzzytree.auditing.diff.difference_records import Difference
+from fuzzytree.auditing.diff.differences import difference, joined_domain
+from fuzzytree.auditing.diff.matching import Curves
+from fuzzytree.auditing.diff.system_bounds import ExactSystem, NotExactError, most
+from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.model import (

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
+from fuzzytree.auditing.decide.states import Bracket, Proved, Witness, point_of
 from fuzzytree.auditing.findings.records import Audit, AuditAnswer
 from fuzzytree.auditing.findings.subject import AuditView
 from fuzzytree.model import FuzzySystem

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fuzzytree.auditing.decide import Budget
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.auditing.findings.subject import subject_of as ready

@@ -13,8 +13,8 @@ from sklearn import datasets
 
 import fuzzytree as ft
 from fuzzytree.api.verbs import audited_rows
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Declined
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.codes import AUDITED, CODES, FAMILIES
 from fuzzytree.auditing.findings.locations import model_file

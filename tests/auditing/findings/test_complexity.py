@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import AuditSelection
 from fuzzytree.auditing.findings.subject import Material
@@ -16,7 +16,7 @@ from fuzzytree.model.tree import depth
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
-from tests.auditing.engine.bases import random_base
+from tests.auditing.decide.old_bases import random_base
 
 DOWN = Term("low", Points((0.0, 2.0), (1.0, 0.0)))
 UP = Term("high", Points((0.0, 2.0), (0.0, 1.0)))

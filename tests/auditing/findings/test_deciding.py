@@ -5,8 +5,8 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide import Budget
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, Witness
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Bracket, Declined, Proved, Witness
 from fuzzytree.auditing.findings.deciding import answers
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
 from fuzzytree.auditing.findings.subject import subject_of
@@ -20,7 +20,7 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule
+from tests.auditing.decide.old_bases import random_base, unit_domain, with_hidden_rule
 
 LOW = Term("low", Points((0.0, 1.0), (1.0, 0.0)))
 HIGH = Term("high", Points((0.0, 1.0), (0.0, 1.0)))

@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.decide import Budget
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Declined,
     Proved,

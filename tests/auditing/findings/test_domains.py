@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.domain import DomainSide
+from fuzzytree.auditing.decide.domain import DomainSide
 from fuzzytree.auditing.findings.domains import domain_of, limited
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model import (

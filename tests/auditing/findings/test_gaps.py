@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.states import Declined, Proved, Witness
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings.gaps import answers
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows, subject_of

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.states import Proved
+from fuzzytree.auditing.decide.states import Proved
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import Audit, AuditAnswer, AuditSelection
 from fuzzytree.auditing.findings.subject import Material

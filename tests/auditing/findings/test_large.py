@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from fuzzytree.auditing.engine.states import Witness
+from fuzzytree.auditing.decide.states import Witness
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import Audit, AuditSettings
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model.rulebase import RuleBase
-from tests.auditing.engine.bases import random_base, unit_domain
+from tests.auditing.decide.old_bases import random_base, unit_domain
 
 BUDGET_S = 2.0
 SLACK_S = 1.5  # one step at the end, on a machine that others use too

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fuzzytree.auditing.engine.regions import Region
-from fuzzytree.auditing.engine.states import Declined, Proved, Witness
+from fuzzytree.auditing.decide.regions import Region
+from fuzzytree.auditing.decide.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings import leaves
 from fuzzytree.auditing.findings.leaves import answers, too_many_boxes, values_text
 from fuzzytree.auditing.findings.records import AuditAnswer

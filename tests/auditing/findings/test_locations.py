@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.auditing.engine.states import Proved, Span
+from fuzzytree.auditing.decide.states import Proved, Span
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import (
     ModelFile,

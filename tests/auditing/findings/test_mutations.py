@@ -16,7 +16,7 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Bracket,
     Computed,
     Proved,

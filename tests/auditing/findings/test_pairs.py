@@ -7,8 +7,7 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import prediction_at
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing.decide.states import (
     Declined,
     Proved,
     Witness,
@@ -37,7 +36,7 @@ from fuzzytree.model import (
     Variable,
 )
 from fuzzytree.numerics.exact import exact_answer
-from tests.auditing.engine.bases import random_base
+from tests.auditing.decide.old_bases import random_base
 from tests.auditing.findings.test_views import A_LOW, block_of, system_of
 
 LOW = Term("low", Points((0.0, 2.0, 4.0), (1.0, 1.0, 0.0)))
@@ -511,9 +510,9 @@ def test_an_input_where_a_proposition_matters_is_reported(
     assert isinstance(one.state, Witness)
     point = point_of(one.state.point)
     shorter = replace(rules.rules[1], when=rules.rules[1].when[:1])
-    assert prediction_at(rules, point).label == one.state.claims[0].label
+    assert _class_at(rules, point) == one.state.claims[0].label
     without = replace(rules, rules=(rules.rules[0], shorter))
-    assert prediction_at(without, point).label == "hard"
+    assert _class_at(without, point) == "hard"
 
 
 def test_propositions_of_a_rule_that_never_fires_are_not_tested() -> None:
@@ -547,3 +546,7 @@ def test_what_a_spent_budget_leaves_open_is_a_bracket_or_cut_short() -> None:
     )
     states = {type(one.state) for one in made.answers}
     assert not made.is_complete or Declined in states
+
+
+def _class_at(rules: RuleBase, point: dict[str, Fraction]) -> str | None:
+    return exact_answer(rules, {n: float(x) for n, x in point.items()}).label

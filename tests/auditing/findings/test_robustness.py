@@ -13,7 +13,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.auditing.decide import Budget
 from fuzzytree.auditing.decide.costs import Costs
-from fuzzytree.auditing.engine.states import Declined, Proved, Witness, point_of
+from fuzzytree.auditing.decide.states import Declined, Proved, Witness, point_of
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.robustness import (
     RowDecider,
@@ -25,7 +25,7 @@ from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import Conjunction, RuleBase
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.testing import random_tree
-from tests.auditing.engine.bases import random_base
+from tests.auditing.decide.old_bases import random_base
 from tests.auditing.findings.small_trees import one_cut, subject_of, two_cuts
 
 

@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.states import Claim, Proved, Span, Witness, coordinates
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Claim, Proved, Span, Witness, coordinates
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.rows import (
     distance_measure,

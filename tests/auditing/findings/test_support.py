@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide import Budget, OutOfStepsError
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.states import Declined, Sampled
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Declined, Sampled
 from fuzzytree.auditing.findings import support
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
@@ -36,7 +36,7 @@ from fuzzytree.model import (
     Variable,
 )
 from fuzzytree.numerics.exact import MISSING, TIE, UNCOVERED, exact_answer
-from tests.auditing.engine.bases import random_base
+from tests.auditing.decide.old_bases import random_base
 from tests.auditing.findings.test_views import A_LOW, block_of, system_of
 
 LOW = Term("low", Points((0.0, 1.0), (1.0, 0.0)))

@@ -8,8 +8,8 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.states import Declined, Proved, short
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Declined, Proved, short
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from fuzzytree import learn
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains, span
-from fuzzytree.auditing.engine.regions import cut_side
+from fuzzytree.auditing.decide.domain import Domain, DomainSide, contains, span
+from fuzzytree.auditing.decide.regions import cut_side
 from fuzzytree.auditing.findings.domains import domain_of, limited
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.checking import load_content

@@ -9,8 +9,8 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.rules import MOST_QUESTIONS, MOST_WAYS
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.auditing.findings.subject import AuditView, subject_of

@@ -15,14 +15,14 @@ from fractions import Fraction
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import (
+from fuzzytree.auditing.decide.domain import (
     Domain,
     DomainSide,
     snapped,
     span,
     variable_value,
 )
-from fuzzytree.auditing.engine.linear import Row, feasible, row_of
+from fuzzytree.auditing.decide.linear import Row, feasible, row_of
 from fuzzytree.model import Branch, FuzzyTree, Value, Variable, intervals
 from fuzzytree.numerics import outwards
 

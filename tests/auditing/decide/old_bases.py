@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -85,11 +83,6 @@ def random_base(
     return RuleBase(
         f"base {seed}", labels, tuple(variables), tuple(made), Semantics(conjunction)
     )
-
-
-def cpu_clock(budget_s: float) -> Clock:
-    """Return a budget of processor seconds, which a busy machine does not shorten."""
-    return Clock(budget_s, now=time.process_time)
 
 
 def unit_domain(rules: RuleBase, low: float = 0.0, high: float = 1.0) -> Domain:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.auditing.engine.domain import Domain, linear_form
+from fuzzytree.auditing.decide.domain import Domain, linear_form
 from fuzzytree.model import Variable, checkpoint
 
 ZERO, ONE = Fraction(0), Fraction(1)

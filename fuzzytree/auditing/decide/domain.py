@@ -7,7 +7,7 @@ nearly all of space is uncovered. So each input has two ends, with their origin.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from typing import Literal
 
@@ -222,7 +222,7 @@ def contains(
     """Return whether a point of the inputs is in a domain, exactly.
 
     Example:
-        >>> from fuzzytree.auditing.engine.domain import DomainSide
+        >>> from fuzzytree.auditing.decide.domain import DomainSide
         >>> box = Domain((DomainSide("x", 0.0, 1.0, is_open=True),))
         >>> contains(box, [Variable("x")], {"x": Fraction(0)})
         False
@@ -234,3 +234,35 @@ def contains(
         if not side.has(variable_value(variable, point)):
             return False
     return True
+
+
+_DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
+
+
+def simplified(
+    point: Mapping[str, Fraction],
+    domain: Domain,
+    holds: Callable[[Mapping[str, Fraction]], bool],
+) -> dict[str, Fraction]:
+    """Return a point of fewer digits near another one.
+
+    `domain`: where the point stays; `holds`: whether a point will do.
+
+    Example:
+        >>> from fuzzytree.auditing.decide.domain import Domain, DomainSide
+        >>> box = Domain((DomainSide("x", 0.0, 1.0),))
+        >>> simplified({"x": Fraction(1, 3)}, box, lambda at: 3 * at["x"] < 1)
+        {'x': Fraction(5944751508129055, 18014398509481984)}
+    """
+    best = dict(point)
+    for name, value in point.items():
+        side = domain.side(name)
+        for digits in _DIGITS if side else ():
+            near = float(f"{float(value):.{digits}g}")
+            if side is None or not side.has(Fraction(near)):
+                continue
+            tried = {**best, name: Fraction(near)}
+            if holds(tried):
+                best = tried
+                break
+    return best

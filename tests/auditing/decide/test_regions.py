@@ -5,8 +5,8 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains
-from fuzzytree.auditing.engine.regions import (
+from fuzzytree.auditing.decide.domain import Domain, DomainSide, contains
+from fuzzytree.auditing.decide.regions import (
     boxes,
     common,
     cut_side,

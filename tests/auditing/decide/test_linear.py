@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.linear import Range, Row, feasible, simple
+from fuzzytree.auditing.decide.linear import Range, Row, feasible, simple
 
 UNIT = (Fraction(0), Fraction(1))
 ONE = Fraction(1)
