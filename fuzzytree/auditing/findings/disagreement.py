@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from fuzzytree.auditing.decide.answers import Budget, Point
+from fuzzytree.auditing.decide.answers import Budget, OutOfStepsError, Point
 from fuzzytree.auditing.decide.answers import Proved as NoPoint
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.contest import Contest, decided
@@ -330,7 +330,11 @@ def _leaf_difference(
         start = point_in(both.leaves.boxes[part], both.tree)
         if start is None:
             continue
-        answer = both.search(part, start, budget).any()
+        try:
+            answer = both.search(part, start, budget).any()
+        except OutOfStepsError:
+            why = why or "the budget was spent"
+            continue
         if isinstance(answer, Point):
             point = dict(answer.values)
         elif not isinstance(answer, NoPoint):
