@@ -257,7 +257,7 @@ HELP = "\n  fuzzytree audit --help lists the options\n"
         ),
         (
             ("--budget", "0"),
-            f"the budget must be above 0 and at most 1e9 seconds, not 0.0{HELP}",
+            f"budget must be above 0 and at most 1e9 million steps, not 0.0{HELP}",
         ),
         (
             ("--setting", "epsiln=1"),

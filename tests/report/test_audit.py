@@ -19,8 +19,8 @@ from tests.report.audits import LINES, every_state
 
 WHOLE = """\
 2 findings: 1 error, 1 warning beside 1 accepted; incomplete: the budget is spent \
-(--budget
-  SECONDS); 1 PROVED, none confirmed; `fuzzytree explain FT101` explains the gravest
+(--budget STEPS);
+  1 PROVED, none confirmed; `fuzzytree explain FT101` explains the gravest
 grip: audited as rules; AND is minimum, the strongest rule decides
 rows     4 of grasps.csv
 domain

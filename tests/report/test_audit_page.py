@@ -187,7 +187,7 @@ def test_the_page_reports_how_to_repeat_the_audit() -> None:
         "ab" * 32,
         "cd" * 32,
         "epsilon 0.1",
-        "budget 60 s",
+        "budget 60.0",
         "area 0.0 100.0 the model's range",
     ):
         assert said in text, said
@@ -419,7 +419,7 @@ def test_the_weights_of_a_systems_rules_are_reported() -> None:
         for one in system.blocks
     ]
     audit = audit_of(rule_base(), (), form="system")
-    said = "The strengths of these are multiplied by their weights: rule 5 by 0.25"
+    said = "The strengths of these are multiplied by their weights: rule 1 by 0.25, "
     plain, weighted = (
         Outline(page(audit, one)).text
         for one in (system, replace(system, blocks=tuple(blocks)))
