@@ -111,11 +111,14 @@ class Search:
                 input rises.
         """
         random = np.random.default_rng(0)
-        places = [self.model.inputs.index(name) for name in changes]
+        axes, places = self._axes, [*map(self.model.inputs.index, changes)]
         rows = np.array([[[*map(float, line)]] for line in self.base.samples])
-        rows = rows.repeat(1 + bool(places), axis=1)
+        rows = np.tile(rows, (1, 2, 3)) if places else rows
         for place in places:
-            rows[place, 1] = random.permutation(rows[place, 1])
+            far, axis = random.permutation(rows[place, 1]) - rows[place, 1], axes[place]
+            if not (axis.values or axis.extra):
+                far[::2] *= 2.0 ** -random.integers(9, size=far[::2].size)
+            rows[place, 1] += np.rint(far) if axis.is_whole else far
         best, most = rows[..., :1], -math.inf
         for share in (0.0, *_SHARES):
             if share:
