@@ -111,7 +111,7 @@ def edit(facts: Facts, way: Way, chance: random.Random) -> None:
     elif isinstance(value, bool):
         holder[way[-1]] = not value
     elif value is None:
-        holder[way[-1]] = chance.choice(["x", 1.0, "0"])
+        holder[way[-1]] = chance.choice(["x", 1.0, "7"])
     elif isinstance(value, int | float):
         holder[way[-1]] = value + chance.choice([1, -1])
     else:
@@ -250,6 +250,20 @@ def test_an_audit_without_one_of_its_answers_is_reported(code: str) -> None:
         facts = json.loads(text) | {"answers": rest}
         facts["digest"] = digest_of(facts)
         assert wrong_with(facts, content), answers[gone[0]]["sentence"]
+
+
+def test_a_gap_that_is_made_larger_is_reported() -> None:
+    content = Path("examples/grip.yaml").read_bytes()
+    material = Material(load("examples/grip.yaml"), model_file("grip.yaml", content))
+    text = audit(material, selection=AuditSelection(select=["FT301"])).to_json()
+    facts = json.loads(text)
+    gap = next(o for o in facts["answers"] if o["message"].startswith("FT301.gap"))
+    for region in (gap["region"], gap["state"]["region"]):
+        region[0]["low"] -= 0.25
+    gap["sentence"] = gap["sentence"].replace("0.8 to 1", "0.55 to 1")
+    facts["digest"] = digest_of(facts)
+    wrong = wrong_with(facts, content)
+    assert any("gap 1 is so in all of its region" in why for why in wrong)
 
 
 def test_a_finding_without_a_cause_is_reported() -> None:

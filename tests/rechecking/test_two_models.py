@@ -123,3 +123,10 @@ def test_a_comparison_without_a_field_is_refused() -> None:
     with pytest.raises(CannotRunError) as caught:
         checked(facts, old, new)
     assert str(caught.value) == "diff.json: missing or unknown: verdict"
+
+
+def test_a_solver_that_fails_is_no_refutation() -> None:
+    found, old, new = compared(base(), base())
+    names = "diff.json", "old.yaml", "new.yaml"
+    with pytest.raises(CannotRunError, match=r"^no/such: no such program$"):
+        recheck_difference(found.to_json().encode(), old, new, names, "no/such")
