@@ -1,13 +1,8 @@
-"""How long audits take: exact questions, branch and bound, and models that are large.
+"""What audits of large models decide within a budget, and what they take.
 
-    python benchmarks/auditing.py            questions about small rule bases
-    python benchmarks/auditing.py --more     20 x 11 and 40 x 11 too; some minutes
-    python benchmarks/auditing.py --large    whole audits of large models in a budget
+    python benchmarks/auditing.py --budgets 5 60
 
-A question is whether a rule is anywhere stronger than all rules of other classes. Times
-are seconds of the processor, so that others on the machine change them little. The
-floor is what nobody can do without: one evaluation of all rules in fractions, as it
-takes to tell a witness. Each ratio is to it, in the same run.
+A budget is counted in million steps, a model after the other in a process of its own.
 """
 
 from __future__ import annotations
@@ -18,25 +13,16 @@ import os
 import platform
 import random
 import resource
-import statistics
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from fractions import Fraction
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # for tests.*
 
-from fuzzytree.auditing.engine import arrangement as arrangements
-from fuzzytree.auditing.engine.arrangement import arrange, rule_strengths
-from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.levels import levels_of
-from fuzzytree.auditing.engine.questions import wins
-from fuzzytree.auditing.decide.states import State
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.auditing.findings.subject import Material
@@ -50,124 +36,9 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.numerics.oracle import decide
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
-from tests.auditing.decide.old_bases import random_base, unit_domain, with_hidden_rule
-
-BUDGET_S = 2.0  # for one question under the product
-
-
-class Asked(NamedTuple):
-    """All questions about a rule base.
-
-    Attributes:
-        states: The answers.
-        cut_s: What it took to cut the axes.
-        each_s: What each question took.
-        floor_s: One evaluation of all rules in fractions.
-        levels: How many critical levels there are.
-    """
-
-    states: list[State]
-    cut_s: float
-    each_s: list[float]
-    floor_s: float
-    levels: int
-
-
-def asked(base: RuleBase, budget_s: float) -> Asked:
-    """Ask of each rule whether it ever wins."""
-    arrangements.arrange.cache_clear()
-    box = unit_domain(base)
-    start = time.process_time()
-    arrangement = arrange(base, box)
-    is_minimum = base.semantics.conjunction == "minimum"
-    levels = len(levels_of(arrangement).levels) if is_minimum else 0
-    cut_s = time.process_time() - start
-    states: list[State] = []
-    each: list[float] = []
-    for number, rule in enumerate(base.rules, 1):
-        rivals = [n for n, one in enumerate(base.rules, 1) if one.then != rule.then]
-        clock = Clock(budget_s, now=time.process_time)
-        start = time.process_time()
-        states.append(wins(arrangement, number, rivals, clock))
-        each.append(time.process_time() - start)
-    point = {name: Fraction(3, 8) for name in base.inputs}
-    start = time.process_time()
-    for _ in range(10):
-        rule_strengths(base, point)
-    floor = (time.process_time() - start) / 10
-    return Asked(states, cut_s, each, floor, levels)
-
-
-def told(name: str, found: Sequence[Asked]) -> None:
-    """Print a line about rule bases of one kind."""
-    every = [one for of in found for one in of.each_s]
-    states = Counter(type(one).__name__ for of in found for one in of.states)
-    floor = statistics.median(of.floor_s for of in found)
-    middle = statistics.median(every)
-    closed = states["Witness"] + states["Proved"] + states["Computed"]
-    cut = statistics.median(of.cut_s for of in found)
-    whole = statistics.median(of.cut_s + sum(of.each_s) for of in found)
-    levels = f"{found[-1].levels:6}" if found[-1].levels else "     -"
-    print(
-        f"  {name:40} {levels} {cut:8.3f} {1e3 * middle:9.1f} {max(every):8.2f} "
-        f"{whole:8.3f} {1e3 * floor:7.2f} {middle / floor:7.0f}  "
-        f"{closed} of {len(every)}, {states['Proved']} proved"
-    )
-
-
-def kinds(
-    conjunction: Conjunction, rules: int, features: int, seed: int
-) -> Iterator[tuple[str, RuleBase]]:
-    """Yield rule bases of a size, each with what is special about it."""
-    for kind in ("lr", "points", "mixed"):
-        plain = random_base(seed, rules, features, conjunction, kind)
-        yield kind, plain
-        yield f"{kind}, one never wins", with_hidden_rule(plain)
-    sliver = with_hidden_rule(random_base(seed, rules, features, conjunction), 0.699999)
-    yield "lr, one wins in a sliver", sliver
-    odd = random_base(
-        seed, rules, features, conjunction, "mixed", odd=0.3, combinations=2
-    )
-    yield "mixed, negations, ORs, sums of inputs", odd
-
-
-def questions(conjunction: Conjunction, rules: int, features: int, count: int) -> None:
-    """Print how long questions take about generated rule bases of one size."""
-    budget = BUDGET_S if conjunction == "product" else 60.0
-    print(f"\n{conjunction}, {rules} x {features}, {budget:g} s for a question at most")
-    print(
-        f"  {'rule bases':40} {'levels':>6} {'cut s':>8} {'median ms':>9} "
-        f"{'max s':>8} {'all s':>8} {'floor':>7} {'ratio':>7}  closed"
-    )
-    found: dict[str, list[Asked]] = {}
-    for seed in range(count):
-        for name, base in kinds(conjunction, rules, features, seed):
-            found.setdefault(name, []).append(asked(base, budget))
-    for name, of in found.items():
-        told(name, of)
-
-
-def a_sliver(rows: int) -> None:
-    """Print how a rule that wins in a sliver is found, and how often rows meet it."""
-    base = with_hidden_rule(random_base(0, 7, 4, "minimum", "lr"), 0.7 - 1e-6)
-    found = asked(base, 60.0)
-    start = time.process_time()
-    values = np.random.default_rng(0).random((len(base.inputs), rows))
-    hits = int(
-        (decide(base, values, with_strengths=False).rule == len(base.rules)).sum()
-    )
-    drawn = time.process_time() - start
-    taken = found.cut_s + found.each_s[-1]
-    print(
-        f"\na rule that wins in a sliver: {type(found.states[-1]).__name__} in "
-        f"{taken:.3f} s; {hits} of {rows} random rows meet it, in {drawn:.1f} s"
-    )
-
-
-# --- whole audits of large models
+from tests.auditing.decide.bases import random_base, unit_domain
 
 
 def shared(
@@ -248,17 +119,15 @@ LARGE: dict[str, Callable[[], RuleBase]] = {
 }
 
 
-def whole(name: str, budget_s: float) -> str:
+def whole(name: str, budget: float) -> str:
     """Return a line about the audit of one large model; for a process of its own."""
     base = LARGE[name]()
     box = unit_domain(base, -3.0 if "tree" in name else 0.0, 1.0)
-    clock = Clock(budget_s, now=time.process_time)
     start, wall = time.process_time(), time.perf_counter()
     found = audit(
         Material(base),
         domain=box,
-        settings=AuditSettings(budget_s=budget_s),
-        clock=clock,
+        settings=AuditSettings(budget=budget),
     )
     taken, wall = time.process_time() - start, time.perf_counter() - wall
     states = Counter(type(one.state).__name__ for one in found.answers)
@@ -269,7 +138,7 @@ def whole(name: str, budget_s: float) -> str:
         states["Witness"] + states["Proved"] + states["Computed"] + states["Sampled"]
     )
     return (
-        f"  {name:32} {budget_s:6g} {taken:6.1f} {wall:6.1f} {most:6.0f} {known:6} "
+        f"  {name:32} {budget:6g} {taken:6.1f} {wall:6.1f} {most:6.0f} {known:6} "
         f"{states['Bracket']:6} {states['Declined']:6} {cut:6} {left:6}"
     )
 
@@ -289,29 +158,16 @@ def large(budgets: Sequence[float]) -> None:
 
 def main() -> None:
     """Measure what was asked for."""
-    parser = argparse.ArgumentParser(description="Time audits, and questions of them.")
-    parser.add_argument("--bases", type=int, default=5, help="of each kind")
-    parser.add_argument("--more", action="store_true", help="20 x 11 and 40 x 11 too")
-    parser.add_argument("--large", action="store_true", help="whole audits")
+    parser = argparse.ArgumentParser(description="Time audits of large models.")
     parser.add_argument("--budgets", type=float, nargs="+", default=[5.0])
-    given = parser.parse_args()
-    load = ", ".join(f"{one:.1f}" for one in os.getloadavg())
+    options = parser.parse_args()
+    load = ", ".join(f"{part:.1f}" for part in os.getloadavg())
     print(
         f"{platform.python_implementation()} {platform.python_version()}, numpy "
         f"{np.__version__}, {os.cpu_count()} processors ({platform.machine()}), load "
-        f"{load}; one process, seeds 0 to {given.bases - 1}"
+        f"{load}"
     )
-    if given.large:
-        large(given.budgets)
-        return
-    questions("minimum", 7, 4, given.bases)
-    questions("minimum", 12, 8, max(given.bases // 2, 1))
-    a_sliver(1_000_000)
-    questions("product", 7, 4, given.bases)
-    if given.more:
-        questions("minimum", 20, 11, max(given.bases // 5, 1))
-        questions("minimum", 40, 11, 1)
-        questions("product", 20, 11, max(given.bases // 5, 1))
+    large(options.budgets)
 
 
 if __name__ == "__main__":
