@@ -33,7 +33,7 @@ def test_every_module_of_the_package_has_its_layer() -> None:
     assert modules == placed
 
 
-@pytest.mark.parametrize("package", ["diff", "engine", "findings"])
+@pytest.mark.parametrize("package", ["decide", "diff", "findings"])
 def test_the_map_of_a_package_names_each_of_its_modules(package: str) -> None:
     folder = ROOT / "fuzzytree" / "auditing" / package
     modules = {path.stem for path in folder.glob("*.py")} - {"__init__"}

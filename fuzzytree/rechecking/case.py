@@ -237,7 +237,7 @@ class Case:
             x = variable.at(point)
             low, high = bounds(variable.curves[claim.term], x, x)
             return low <= level <= high
-        key = claim.of, *point.values()
+        key = claim.of, *sorted(point.items())
         if key not in self._strengths:
             self._strengths[key] = strengths(rules, point)
         every = self._strengths[key]

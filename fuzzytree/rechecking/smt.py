@@ -38,6 +38,9 @@ _PRELUDE = """
 (define-fun min ((a Real) (b Real)) Real (ite (<= a b) a b))
 (define-fun max ((a Real) (b Real)) Real (ite (>= a b) a b))""".strip()
 
+MOST_WHOLE = 64
+"""The most whole numbers that are listed one by one."""
+
 
 class Line(NamedTuple):
     """A line through a point, `degree + slope (x - start)`."""
@@ -246,6 +249,11 @@ class Script:
         elif low is not None and high is not None:
             ends = f"(<= {self.number(low)} {own}) (<= {own} {self.number(high)})"
             formulas = [f"(and {ends})"]
+            if variable.is_whole and high - low < MOST_WHOLE:
+                whole = map(Fraction, range(math.ceil(low), math.floor(high) + 1))
+                formulas = [f"(= {own} {self.number(value)})" for value in whole]
+            elif variable.is_whole:  # a point between whole numbers refutes nothing
+                self.is_exact = False
         values = [*map(Fraction, range(len(variable.categories)))]
         if variable.missing is not None and (values or formulas):
             values.append(variable.missing)

@@ -271,7 +271,7 @@ def rewritten(path: Path, change: dict[str, object], drop: str = "") -> None:
 @pytest.mark.parametrize(
     ("change", "drop", "message"),
     [
-        ({"magic": "fuzzytree state 4"}, "", "is 'fuzzytree state 3', and 'fuzzytree"),
+        ({"magic": "fuzzytree state 4"}, "", "is 'fuzzytree state 4', and 'fuzzytree"),
         ({"magic": "fuzzytree leaf counts 1"}, "", "of `fuzzytree collect --for`, and"),
         ({"columns": ["a", "b", "c"]}, "", "has not the 9 numbers of type float64"),
         ({"columns": ["a", "a", "c", "d"]}, "", "names a column or a class twice"),

@@ -187,7 +187,7 @@ def test_the_page_reports_how_to_repeat_the_audit() -> None:
         "ab" * 32,
         "cd" * 32,
         "epsilon 0.1",
-        "budget 60.0",
+        "budget 60 The domain",
         "area 0.0 100.0 the model's range",
     ):
         assert said in text, said

@@ -1,4 +1,23 @@
-"""The decider: one question about rules, answered by a proof, a point, or not."""
+"""The decider: one question about rules, answered by a proof, a point, or not.
+
+In reading order:
+
+The question
+    - `answers`: the question, its three answers, the budget in steps
+    - `domain`, `states`: where rows lie; how an audit states an answer
+    - `lines`, `rules`, `axes`: degrees as lines; rules of any model; axes with both
+    - `base`: rules on a domain, their exact strengths, points that are drawn
+
+Methods
+    - `decider`: which method decides a question
+    - `levels`: the minimum; `boxes`, `bounds`: products and curves; `solver`: z3
+    - `linear`, `polytopes`, `regions`: linear inequalities, the leaves of a tree
+
+Claims
+    - `claims`, `pairs`, `cover`: of rules, of two rules, of gaps
+    - `nearest`, `search`, `contest`, `costs`: the nearest change of a row
+    - `outputs`, `measures`: outputs of systems on boxes; heights, areas and distances
+"""
 
 from fuzzytree.auditing.decide.answers import (
     Answer,

@@ -47,7 +47,7 @@ def nearest(
         ValueError: If an input is unknown, or a cost is not above 0.
 
     Example:
-        >>> from fuzzytree.auditing.engine.domain import Domain, DomainSide
+        >>> from fuzzytree.auditing.decide.domain import Domain, DomainSide
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1)
         >>> box = Domain(tuple(DomainSide(name, -9.0, 9.0) for name in tree.inputs))

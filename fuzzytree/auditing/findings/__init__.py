@@ -7,11 +7,8 @@ An audit
     - `codes`: every question and reason, and the families that answer them
     - `subject`: the model and the settings, as each family receives them
     - `audit`: runs all families within the budget
-    - `domains`, `views`, `system_conditions`: the domain; the rules of a model as a
-      rule base; terms and conditions of fuzzy systems as propositions
+    - `domains`, `views`: the domain; the rules of a model as an audit sees them
     - `table_words`: values of inputs as their table has them, shown and read
-    - `curve_bounds`, `rule_bounds`, `bounded_arrangement`: lower and upper bounds of
-      curves that are not polynomial, and of rules with them or with weights
     - `locations`: where rules stand in a file; ids that do not depend on their order
     - `results`, `baselines`, `configuration`: results of other verbs, accepted findings
       and settings, from files

@@ -5,6 +5,8 @@ from __future__ import annotations
 import random
 from typing import Literal
 
+from msgspec.structs import replace
+
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.model import (
     LR,
@@ -38,13 +40,14 @@ def random_base(
         if kind == "categories" and n % 2 == 0:
             values = ("blue", "green", "red", "white", "yellow")
             terms = tuple(Term(f"t{k}", _choice(chance)) for k in range(4))
-            variables.append(Variable(name, terms, categories=values))
+            variables.append(Variable(name, terms, categories=values, missing=-1.0))
             codes = tuple(map(float, range(5)))
             sides.append(DomainSide(name, 0.0, 4.0, values=codes, missing=-1.0))
         elif kind == "categories":
             missing = chance.choice([None, 5.5, 1.25])
-            variables.append(Variable(name, terms, low=0.0, high=4.0, missing=missing))
             is_whole = chance.random() < 0.5
+            variable = Variable(name, terms, low=0.0, high=4.0, missing=missing)
+            variables.append(replace(variable, is_whole=is_whole))
             sides.append(DomainSide(name, 0.0, 4.0, is_whole=is_whole, missing=missing))
         else:
             variables.append(Variable(name, terms, low=0.0, high=4.0))
