@@ -29,7 +29,7 @@ from tests.interop.corpus_fll import FLL
 Model = ft.RuleBase | ft.FuzzyTree | ft.FuzzySystem
 
 STATES = ("Proved", "Computed", "Witness", "Bracket", "Declined")
-BUDGET_S = 20.0
+BUDGET = 20.0
 LEFT_OUT = ("FT6", "FT7")  # they need rows or runtimes
 
 
@@ -75,7 +75,7 @@ def row(name: str) -> str:
         audit = ft.audit(
             model,
             selection=ft.AuditSelection(skip=LEFT_OUT),
-            settings=ft.AuditSettings(budget_s=BUDGET_S),
+            settings=ft.AuditSettings(budget=BUDGET),
         )
         seconds += time.process_time() - start
         states.update(type(one.state).__name__ for one in audit.answers)

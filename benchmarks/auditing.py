@@ -38,7 +38,7 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
-from tests.auditing.decide.bases import random_base, unit_domain
+from tests.auditing.decide.old_bases import random_base, unit_domain
 
 
 def shared(

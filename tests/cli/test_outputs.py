@@ -27,8 +27,8 @@ def _commands() -> list[click.Command]:
 
 
 def test_every_file_to_write_is_compared_with_the_files_to_read() -> None:
-    names = ("output", "page", "picture", "front", "plots", "write_baseline", "record")
-    names += ("smt",)
+    names = {"output", "page", "picture", "front", "plots", "write_baseline", "record"}
+    names.add("smt")
     for command in _commands():
         for option in command.params:
             is_file = option.name in names and option.type.name != "integer range"
