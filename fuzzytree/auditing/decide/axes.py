@@ -214,12 +214,12 @@ class Axis:
             xs = [*self.values]
             lines = {id(one): _sampled(one, xs) for one in self._distinct}
         else:
-            lines = {id(one): _refined(one, xs) for one in self._distinct}
+            lines = {id(one): refined(one, xs) for one in self._distinct}
             if self.is_crossed:
                 more = [*_crossings([*lines.values()])]
                 if more:
                     xs = _sorted([*xs, *more])
-                    lines = {name: _refined(one, xs) for name, one in lines.items()}
+                    lines = {name: refined(one, xs) for name, one in lines.items()}
         result: dict[Literal, Between] = {}
         for literal, (lower, upper) in self.parts.items():
             pick = min if literal.negated else max
@@ -493,7 +493,7 @@ def _sampled(lines: Lines, xs: Sequence[Fraction]) -> Lines:
     return Lines(tuple(xs), at, at[:-1], at[1:])
 
 
-def _refined(lines: Lines, xs: Sequence[Fraction]) -> Lines:
+def refined(lines: Lines, xs: Sequence[Fraction]) -> Lines:
     """Return lines on more knots."""
     if len(xs) == len(lines.x) and lines.x == tuple(xs):
         return lines

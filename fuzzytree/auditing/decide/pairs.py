@@ -25,7 +25,7 @@ from fuzzytree.auditing.decide.answers import (
     Proved,
     Question,
 )
-from fuzzytree.auditing.decide.axes import Axis, value_at
+from fuzzytree.auditing.decide.axes import Axis, refined, value_at
 from fuzzytree.auditing.decide.claims import SPENT, Claims, within
 from fuzzytree.auditing.decide.levels import Interior, by_levels
 from fuzzytree.auditing.decide.lines import Lines
@@ -107,7 +107,8 @@ class Pairs:
 
     def __init__(self, claims: Claims) -> None:
         self.claims, self.base = claims, claims.base
-        self._distances: dict[tuple[str, int, int, Fraction], Distance] = {}
+        self._columns: dict[tuple[str, frozenset[_Set]], Columns] = {}
+        self._distances: dict[tuple[str, frozenset[_Set], Fraction], Distance] = {}
 
     @cached_property
     def sets(self) -> dict[str, list[_Set]]:
@@ -121,13 +122,14 @@ class Pairs:
                 result[name][place] |= {(literal, count)}
         return result
 
-    @cached_property
-    def columns(self) -> dict[str, Columns]:
-        """The functions of all rules, by axis."""
-        return {
-            name: Columns(self.base.axes[name], sets)
-            for name, sets in self.sets.items()
-        }
+    def columns(self, name: str, *sets: _Set) -> Columns:
+        """Return some functions on an axis, on the knots of their literals alone."""
+        key = name, frozenset(sets)
+        if key not in self._columns:
+            literals = frozenset(literal for one in sets for literal, _ in one)
+            axis = self.base.axes[name].with_literals(literals)
+            self._columns[key] = Columns(axis, sets)
+        return self._columns[key]
 
     # --- how high two rules reach together
 
@@ -136,14 +138,45 @@ class Pairs:
         """About how high each pair reaches together at most, by single axes."""
         factors = np.array([float(rule.factor) for rule in self.base.rules])
         result: FloatArray = np.minimum(factors[:, None], factors[None, :])
-        for name, columns in self.columns.items():
-            table = columns.most
-            size = len(table)
-            both = np.empty((size, size))
-            for n in range(size):
-                both[n] = np.minimum(table[n], table).max(axis=1)
-            of = np.array([columns.sets[one] for one in self.sets[name]])
+        for name, sets in self.sets.items():
+            places = {one: n for n, one in enumerate(dict.fromkeys(sets))}
+            both = self._joint(self.base.axes[name], [*places])
+            of = np.array([places[one] for one in sets])
             result = np.minimum(result, both[of[:, None], of[None, :]])
+        return result
+
+    def _joint(self, axis: Axis, sets: list[_Set]) -> FloatArray:
+        """Return about the largest of the smaller of each two functions on an axis."""
+        size = len(sets)
+        result = np.ones((size, size))
+        ends: dict[int, FloatArray] = {}
+        for n, one in enumerate(sets):
+            lines = [upper for literal, _ in one for upper in axis.parts[literal][1]]
+            if len(lines) == 1 and not axis.values:
+                ends[n] = _ends(axis, lines[0])
+            elif not lines:
+                ends[n] = np.ones((2, 2 * len(axis.bends) + len(axis.extra)))
+        for n, one in enumerate(sets):
+            for m in range(n, size):
+                if n in ends and m in ends:
+                    continue
+                columns = self.columns(axis.name, one, sets[m])
+                least = np.minimum(
+                    *(columns.most[columns.sets[k]] for k in (one, sets[m]))
+                )
+                result[n, m] = result[m, n] = least.max()
+        rows = [*ends]
+        if rows:
+            table = np.array([ends[n] for n in rows])
+            for n, (p, q) in zip(rows, table, strict=True):
+                u, v = table[:, 0], table[:, 1]
+                best = np.maximum(np.minimum(p, u), np.minimum(q, v))
+                turn = (p - u) * (q - v) < 0  # they cross between the ends
+                share = np.where(
+                    turn, (u - p) / np.where(turn, q - p - v + u, 1.0), 0.0
+                )
+                best = np.where(turn, np.maximum(best, p + (q - p) * share), best)
+                result[n, rows] = best.max(axis=1)
         return result
 
     def common(self, i: int, j: int, level: Fraction, budget: Budget) -> Common:
@@ -152,10 +185,10 @@ class Pairs:
         rules = base.rules[i], base.rules[j]
         most = min(rule.factor for rule in rules)
         values: dict[str, Fraction] = {}
-        for name, columns in self.columns.items():
-            both = [columns.sets[self.sets[name][k]] for k in (i, j)]
-            if any(both):
-                mine, theirs = (columns.high[n] for n in both)
+        for name, sets in self.sets.items():
+            if sets[i] or sets[j]:
+                columns = self.columns(name, sets[i], sets[j])
+                mine, theirs = (columns.high[columns.sets[sets[k]]] for k in (i, j))
                 least = [min(pair) for pair in zip(mine, theirs, strict=True)]
                 most = min(most, max(least))
                 if columns.attained:
@@ -210,12 +243,13 @@ class Pairs:
         rules = self.base.rules[i], self.base.rules[j]
         off = abs(rules[0].factor - rules[1].factor)
         worst, total = Distance(off, off), off
-        for name, columns in self.columns.items():
-            a, b = sorted(columns.sets[self.sets[name][k]] for k in (i, j))
-            if a == b:
+        for name, sets in self.sets.items():
+            if sets[i] == sets[j]:
                 continue
-            key = name, a, b, limit
+            key = name, frozenset((sets[i], sets[j])), limit
             if key not in self._distances:
+                columns = self.columns(name, sets[i], sets[j])
+                a, b = (columns.sets[sets[k]] for k in (i, j))
                 self._distances[key] = _apart(columns, a, b, limit)
             total += self._distances[key].high
             worst = max(worst, self._distances[key])
@@ -290,25 +324,29 @@ class Pairs:
 
     @cached_property
     def _flat(self) -> dict[tuple[str, Literal], set[Fraction]]:
-        result = {}
+        result: dict[tuple[str, Literal], set[Fraction]] = {}
         for axis in self.base.used:
-            for literal, two in axis.bounds.items():
-                lower, upper = two.lower, two.upper
-                values = {
-                    p
-                    for p, q, u, v in zip(
-                        lower.after,
-                        lower.before,
-                        upper.after,
-                        upper.before,
-                        strict=True,
-                    )
-                    if p == q == u == v
-                }
-                if axis.values or len(lower.x) == 1:
-                    values = {*lower.at}
-                result[axis.name, literal] = values
+            for literal, sides in axis.parts.items():
+                values = [
+                    {v for lines in side for v in _levels(axis, lines)}
+                    for side in sides
+                ]
+                result[axis.name, literal] = values[0] & values[1]
         return result
+
+    @cached_property
+    def _slopes(self) -> dict[tuple[str, Literal], set[tuple[Fraction, Fraction]]]:
+        """The lines of literals that are not level: the slope, and the value at 0."""
+        return {
+            (axis.name, literal): {
+                (slope := (q - p) / (b - a), p - slope * a)
+                for lines in sides[0]
+                for a, b, p, q in lines.pieces()
+                if p != q
+            }
+            for axis in self.base.used
+            for literal, sides in axis.parts.items()
+        }
 
     def _shared(
         self, axis: Axis, i: int, j: int
@@ -317,6 +355,13 @@ class Pairs:
         mine, theirs = (self.sets[axis.name][k] for k in (i, j))
         if axis.values or not (mine and theirs):
             return ()
+        slopes = [
+            set().union(*(self._slopes[axis.name, literal] for literal, _ in one))
+            for one in (mine, theirs)
+        ]
+        if slopes[0].isdisjoint(slopes[1]):
+            return ()
+        axis = self.columns(axis.name, mine, theirs).axis
         result: list[tuple[Fraction, Fraction]] = []
         for (f, _), (g, _) in itertools.product(mine, theirs):
             a, b = axis.bounds[f], axis.bounds[g]
@@ -392,6 +437,26 @@ class Pairs:
         return None
 
 
+def _levels(axis: Axis, lines: Lines) -> set[Fraction]:
+    """Return the values that lines have on some width, or at single values."""
+    if axis.values or len(lines.x) == 1:
+        return {value_at(lines, x) for x in axis.values or lines.x}
+    return {p for p, q in zip(lines.after, lines.before, strict=True) if p == q}
+
+
+def _ends(axis: Axis, lines: Lines) -> FloatArray:
+    """Return the values of lines at both ends of each stretch between bends."""
+    knots = [x for x in axis.bends if axis.low <= x <= axis.high]
+    fine = refined(lines, axis.bends)
+    first = axis.bends.index(knots[0])
+    rows = range(first, first + len(knots))
+    at = [fine.at[k] for k in rows] + [value_at(lines, x) for x in axis.extra]
+    after = [*at, *(fine.after[k] for k in rows[:-1])]
+    before = [*at, *(fine.before[k] for k in rows[:-1])]
+    spare = [Fraction(0)] * (2 * len(axis.bends) + len(axis.extra) - len(after))
+    return np.array([[float(v) for v in row + spare] for row in (after, before)])
+
+
 def _apart(columns: Columns, a: int, b: int, limit: Fraction) -> Distance:
     """Return how far two functions are apart, and where."""
     places = range(len(columns.x))
@@ -413,6 +478,7 @@ def _apart(columns: Columns, a: int, b: int, limit: Fraction) -> Distance:
 
 def _ratios(axis: Axis, mine: _Set, theirs: _Set) -> Iterator[Fraction]:
     """Yield the ratios of two functions on pieces where they are proportional."""
+    axis = axis.with_literals(frozenset(literal for literal, _ in mine | theirs))
     first, last = (axis.knots.index(x) for x in (axis.low, axis.high))
     for k in range(first, last):
         ends = []
