@@ -8,7 +8,7 @@ The question
     - `lines`, `rules`, `axes`: degrees as lines; rules of any model; axes with both
     - `base`: rules on a domain, their exact strengths, points that are drawn
 
-Methods
+Ways to decide
     - `decider`: which method decides a question
     - `levels`: the minimum; `boxes`, `bounds`: products and curves; `solver`: z3
     - `linear`, `polytopes`, `regions`: linear inequalities, the leaves of a tree

@@ -42,7 +42,9 @@ class _Region:
     def __init__(self, both: Agreement, point: Mapping[str, Fraction]) -> None:
         self.both, self.base, self.point = both, both.base, point
         self.labels = tuple(one.label for one in both.predictions(point))
-        self.box = {axis.name: (point[axis.name],) * 2 for axis in self.base.used}
+        self.box: dict[str, Ends] = {}
+        for axis in self.base.used:
+            self.box[axis.name] = point[axis.name], point[axis.name]
         self.degrees = {
             key: self._range(*key, self.box[key[0]])
             for rule in self.base.rules
