@@ -271,6 +271,11 @@ def _before(place: Fraction, start: Fraction) -> Fraction:
     return near if (near > start) is is_up else start
 
 
+def _alone(base: Base, name: str, literal: Literal) -> Axis:
+    """Return an axis with a single literal, whose knots are few."""
+    return base.axes[name].with_literals(frozenset([literal]))
+
+
 def around(base: Base, point: Mapping[str, Fraction], level: Fraction) -> Sides:
     """Return a box around a point in which each rule has a literal below a level.
 
@@ -282,7 +287,11 @@ def around(base: Base, point: Mapping[str, Fraction], level: Fraction) -> Sides:
         some = [
             (name, literal)
             for name, literal in rule.literals
-            if (v := value_at(base.axes[name].bounds[literal].upper, values[name]))
+            if (
+                v := value_at(
+                    _alone(base, name, literal).bounds[literal].upper, values[name]
+                )
+            )
             < level
             or v <= 0
         ]
@@ -292,7 +301,7 @@ def around(base: Base, point: Mapping[str, Fraction], level: Fraction) -> Sides:
     result: Sides = {}
     for some in sorted(filter(None, options), key=len):
         name, literal = next((one for one in some if one[0] in result), some[0])
-        axis, x = base.axes[name], values[name]
+        axis, x = _alone(base, name, literal), values[name]
         low, high = _extent(axis, axis.bounds[literal].upper, x, level)
         if x in axis.extra:
             low = high = x
