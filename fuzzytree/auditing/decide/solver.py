@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any
@@ -18,6 +19,7 @@ from fuzzytree.auditing.decide.answers import (
 from fuzzytree.auditing.decide.axes import Axis
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.lines import Lines
+from fuzzytree.auditing.decide.rules import Literal
 
 RESOURCES = 1_000_000
 """What z3 may use for a question, in its own unit, which no clock changes."""
@@ -59,8 +61,9 @@ class Solver:
         self.facts: list[Any] = [
             self._within(axis, self.inputs[name]) for name, axis in base.inputs.items()
         ]
-        degrees: dict[tuple[str, object], Any] = {}
-        own: dict[tuple[str, object], list[Any]] = {}
+        self.degrees: dict[tuple[str, Literal], Any] = {}
+        degrees = self.degrees
+        self._facts: dict[tuple[str, Literal], list[Any]] = {}
         self.values: dict[str, Any] = {}
         for name, axis in base.axes.items():
             x = self.number(axis.constant)
@@ -72,16 +75,10 @@ class Solver:
                 self.facts += [x >= self.number(axis.low), x <= self.number(axis.high)]
             self.values[name] = x
             for n, literal in enumerate(axis.literals):
-                both = axis.bounds[literal]
                 degree = z3.Real(f"degree {n} of {name}", self.context)
                 degrees[name, literal] = degree
-                facts = [degree == self.lines(both.lower, x)]
-                if not both.is_exact:
-                    facts = [degree >= self.lines(both.lower, x)]
-                    facts.append(degree <= self.lines(both.upper, x))
-                own[name, literal] = facts
         self.strengths: list[Any] = []
-        self.rule_facts: list[list[Any]] = []
+        self.rule_facts: list[Any] = []
         self.is_linear = True
         for place, rule in enumerate(base.rules):
             strength = self.number(rule.factor)
@@ -94,8 +91,7 @@ class Solver:
                     strength = z3.If(strength <= degree, strength, degree)
             term = z3.Real(f"rule {place + 1}", self.context)
             self.strengths.append(term)
-            facts = [fact for key in rule.literals for fact in own[key]]
-            self.rule_facts.append([*facts, term == strength])
+            self.rule_facts.append(term == strength)
         self._open = self._new()
 
     def _new(self) -> Any:
@@ -108,6 +104,31 @@ class Solver:
         )
         solver.add(*self.facts)
         return solver
+
+    def _of_literal(self, key: tuple[str, Literal]) -> list[Any]:
+        """Return what a degree is: the largest or least of its functions."""
+        if key not in self._facts:
+            name, literal = key
+            degree, x = self.degrees[key], self.values[name]
+            sides = [
+                [self.lines(lines, x) for lines in side]
+                for side in self.base.axes[name].parts[literal]
+            ]
+            lower, upper = (
+                functools.reduce(
+                    lambda one, other: self.z3.If(
+                        one <= other if literal.negated else one >= other, one, other
+                    ),
+                    side,
+                )
+                for side in sides
+            )
+            both = self.base.axes[name].parts[literal]
+            is_exact = all(a is b for a, b in zip(*both, strict=True))
+            self._facts[key] = [degree >= lower, degree <= upper]
+            if is_exact:
+                self._facts[key] = [degree == lower]
+        return self._facts[key]
 
     def number(self, value: Fraction) -> Any:
         """Return an exact number as a term."""
@@ -199,7 +220,9 @@ class Solver:
         solver.set("rlimit", most)
         places = range(self.base.count) if rules is None else dict.fromkeys(rules)
         for place in places:
-            solver.add(*self.rule_facts[place])
+            solver.add(self.rule_facts[place])
+            for key in self.base.rules[place].literals:
+                solver.add(*self._of_literal(key))
         solver.add(formula)
         before = _used(solver)
         result = solver.check()
