@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
+from functools import cached_property
 from typing import NamedTuple
 
 from fuzzytree.auditing.decide.answers import (
@@ -89,12 +90,21 @@ class LevelView:
             base.axes[name].with_literals(frozenset(own))
             for name, own in literals.items()
         ]
+        self.factors = factors
         if not all(axis.is_crossed for axis in self.axes):
             raise TooManyError
-        own = factors.union(*(axis.levels for axis in self.axes))
-        self.levels = sorted(level for level in own if 0 <= level <= 1)
-        if len(self.levels) > _MOST_LEVELS:
+
+    @cached_property
+    def levels(self) -> list[Fraction]:
+        """The critical levels in order, which a question with a level of its own skips.
+
+        Raises:
+            TooManyError: If there are too many.
+        """
+        own = self.factors.union(*(axis.levels for axis in self.axes))
+        if len(own) > _MOST_LEVELS:
             raise TooManyError
+        return sorted(level for level in own if 0 <= level <= 1)
 
     def choice(
         self, question: Question, level: Fraction, budget: Budget, *, loose: bool
@@ -115,10 +125,12 @@ class LevelView:
         for axis in self.axes:
             kept = self._kept(axis, question) if loose else 0
             masks: dict[int, Cell] = {}
-            if self.interior is None:
-                cells = axis.cells(axis.place(level))
-            else:
+            if self.interior is not None:
                 cells = [*self.interior.cells(axis, level, is_at=False)]
+            elif question.level is not None:
+                cells = [*axis.cells_at(level)]
+            else:
+                cells = axis.cells(axis.place(level))
             budget.spend(2 * len(cells) + 4)
             for cell in cells:
                 mine = cell.masks.perhaps if loose else cell.masks.surely
@@ -309,7 +321,8 @@ class _Search:
 
     def _needed(self) -> tuple[int, ...]:
         """Return the rivals without which it would not be proved, one by one."""
-        if self.base.is_coupled and len(self.asked) > 8:
+        is_large = self.base.is_coupled and len(self.asked) > 8
+        if is_large or not self.question.reach:  # of a gap nobody reads them
             return tuple(sorted(self.asked))
         for rival in [*self.asked] if len(self.asked) > 1 else ():
             self.asked.remove(rival)
