@@ -50,6 +50,7 @@ HERE = {
     "the shapes of terms",
     "ties on more than a surface",
     "areas of terms",
+    "curves that are no lines, and too near to each other",
 }
 """Why some proofs are decided by the audit only."""
 
@@ -61,6 +62,7 @@ FREE = {
     r"answers\.repeat": "a command",
     r"unasked": "why something is left out, in words",
     r"answers\.state\.(how|of|why|reason|confirmed)": "how it was made, in words",
+    r"answers\.state\.rivals": "others that suffice prove it as well",
     r"answers\.state\.(low|high|hits|rows|confidence)": "of samples and brackets",
     r"answers\.state\.claims|answers\.(state\.)?region(\..*)?": "it says less",
     r"answers (FTD|.*declined|FT30.*more).*": "of what is declined or left open",

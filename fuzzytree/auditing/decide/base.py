@@ -286,7 +286,7 @@ class Base:
         for name, axis in self.inputs.items():
             if name not in result:
                 result[name] = _plain(axis)
-        return result
+        return {name: result[name] for name in self.inputs}
 
     # --- doubles: points that are drawn, which find most witnesses
 
