@@ -38,7 +38,8 @@ def test_what_is_told_of_real_files_holds_on_a_grid(
         assert isinstance(system, FuzzySystem)
         seen = view(system, domain_of(system))
         ways = {block.activation.method for block in system.blocks}
-        if not seen.inexact or ways != {"general"} or len(system.rules) > 11:
+        is_small = seen.rules is not None and len(system.rules) <= 11
+        if not (is_small and seen.inexact) or ways != {"general"}:
             continue
         files += 1
         found = audit(
