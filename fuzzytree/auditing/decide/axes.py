@@ -27,6 +27,7 @@ from fuzzytree.auditing.decide.lines import (
     Lines,
     degree_within,
     lines_of,
+    refined,
 )
 from fuzzytree.auditing.decide.rules import Literal
 from fuzzytree.model import Curve, IntArray, MembershipFunction
@@ -483,46 +484,13 @@ def _moved(lines: Lines, literal: Literal) -> Lines:
     lines = _scaled(lines, literal.scale)
     if not literal.lowered:
         return lines
-    parts = (tuple(v - literal.lowered for v in of) for of in lines[1:])
-    return Lines(lines.x, *parts)
+    return lines.lowered(literal.lowered)
 
 
 def _sampled(lines: Lines, xs: Sequence[Fraction]) -> Lines:
     """Return lines at single values."""
     at = tuple(value_at(lines, x) for x in xs)
     return Lines(tuple(xs), at, at[:-1], at[1:])
-
-
-def refined(lines: Lines, xs: Sequence[Fraction]) -> Lines:
-    """Return lines on more knots."""
-    if len(xs) == len(lines.x) and lines.x == tuple(xs):
-        return lines
-    at: list[Fraction] = []
-    after: list[Fraction] = []
-    before: list[Fraction] = []
-    piece, last = 0, len(lines.x) - 1
-    for n, x in enumerate(xs):
-        while piece < last and lines.x[piece + 1] <= x:
-            piece += 1
-        if x == lines.x[piece] or last == 0:
-            at.append(lines.at[piece])
-        else:
-            at.append(_on(lines, piece, x))
-        if n + 1 < len(xs):
-            if last == 0:
-                after.append(lines.at[0])
-                before.append(lines.at[0])
-            else:
-                place = min(piece, last - 1)
-                after.append(_on(lines, place, x))
-                before.append(_on(lines, place, xs[n + 1]))
-    return Lines(tuple(xs), tuple(at), tuple(after), tuple(before))
-
-
-def _on(lines: Lines, piece: int, x: Fraction) -> Fraction:
-    p, q = lines.after[piece], lines.before[piece]
-    a, b = lines.x[piece], lines.x[piece + 1]
-    return p if p == q or x == a else q if x == b else p + (q - p) * (x - a) / (b - a)
 
 
 def _extreme(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple
@@ -222,7 +222,7 @@ def _enclosed(function: MembershipFunction, knots: Sequence[Fraction]) -> Betwee
         for side, (chords, limit) in enumerate(zip(sides, held, strict=True))
     )
     knots = sorted({*lower.x, *upper.x})
-    return Between(_with_knots(lower, knots), _with_knots(upper, knots))
+    return Between(refined(lower, knots), refined(upper, knots))
 
 
 class _Block(NamedTuple):
@@ -333,18 +333,36 @@ def _line(chords: Sequence[_Chord], degrees: Mapping[Fraction, Fraction]) -> Lin
     )
 
 
-def _with_knots(lines: Lines, x: Sequence[Fraction]) -> Lines:
-    """Return the same function with more knots."""
-    if len(x) == len(lines.x):
+def refined(lines: Lines, xs: Sequence[Fraction]) -> Lines:
+    """Return lines on more knots."""
+    if len(xs) == len(lines.x) and lines.x == tuple(xs):
         return lines
+    at: list[Fraction] = []
     after: list[Fraction] = []
     before: list[Fraction] = []
-    for a, b in itertools.pairwise(x):
-        place = bisect_right(lines.x, a) - 1
-        ends = lines.x[place], lines.x[place + 1], *lines.ends(place)
-        after.append(_on(*ends, a))
-        before.append(_on(*ends, b))
-    return Lines((*x,), tuple(map(lines.value, x)), tuple(after), tuple(before))
+    piece, last = 0, len(lines.x) - 1
+    for n, x in enumerate(xs):
+        while piece < last and lines.x[piece + 1] <= x:
+            piece += 1
+        if x == lines.x[piece] or last == 0:
+            at.append(lines.at[piece])
+        else:
+            at.append(_on_piece(lines, piece, x))
+        if n + 1 < len(xs):
+            if last == 0:
+                after.append(lines.at[0])
+                before.append(lines.at[0])
+            else:
+                place = min(piece, last - 1)
+                after.append(_on_piece(lines, place, x))
+                before.append(_on_piece(lines, place, xs[n + 1]))
+    return Lines(tuple(xs), tuple(at), tuple(after), tuple(before))
+
+
+def _on_piece(lines: Lines, piece: int, x: Fraction) -> Fraction:
+    p, q = lines.ends(piece)
+    a, b = lines.x[piece], lines.x[piece + 1]
+    return p if x == a else q if x == b else _on(a, b, p, q, x)
 
 
 def _limit(
@@ -491,16 +509,3 @@ def at_knots(one: Lines, other: Lines) -> Iterator[tuple[Fraction, Fraction, Fra
     for a, _, p, _, r, _ in together(one, other):
         yield a, mine.get(a, p), theirs.get(a, r)
     yield one.x[-1], one.at[-1], other.at[-1]
-
-
-@functools.lru_cache(maxsize=1 << 14)
-def meetings(one: Lines, other: Lines) -> frozenset[Fraction]:
-    """Return the values that two functions have where they cross or begin to differ."""
-    found: set[Fraction] = set()
-    for a, b, p, q, r, s in together(one, other):
-        if (p - r) * (q - s) < 0:
-            place = a + (b - a) * (p - r) / (p - r - q + s)
-            found.add(_on(a, b, p, q, place))
-        elif (p == r) != (q == s):
-            found.add(p if p == r else q)
-    return frozenset(found)

@@ -49,7 +49,6 @@ _LEAF_PART = 0.25  # of the steps that are left, for one leaf
 _HINTS = 16  # rows from which a point where both differ is sought at first
 
 _Row = tuple[int, dict[str, Fraction]]
-_Point = Mapping[str, Fraction]
 
 
 class TreeAndRules:
