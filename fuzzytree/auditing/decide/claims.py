@@ -193,12 +193,11 @@ class Claims:
         budget: Budget,
         last: Open,
     ) -> Answer:
-        from fuzzytree.auditing.decide.solver import solver_for
+        from fuzzytree.auditing.decide.solver import solver_for, without_solver
 
         solver = solver_for(self.base)
         if solver is None:
-            why = f"{last.why}; z3 is not installed, which might decide it"
-            return Open(why, last.code)
+            return without_solver(last)
         text = formula(solver.strengths, solver.z3)
         return within(budget, lambda own: solver.ask_formula(text, holds, own, rules))
 

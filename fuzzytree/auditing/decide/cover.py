@@ -26,7 +26,7 @@ from fuzzytree.auditing.decide.answers import (
 from fuzzytree.auditing.decide.axes import Axis, value_at
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.claims import Claims, within
-from fuzzytree.auditing.decide.levels import LevelView, TooManyError, smallest
+from fuzzytree.auditing.decide.levels import LevelView, TooManyError, common
 from fuzzytree.auditing.decide.lines import Lines
 from fuzzytree.auditing.decide.rules import Literal
 
@@ -121,26 +121,12 @@ class _Walk:
 
     def values(self, budget: Budget) -> dict[str, Fraction] | None:
         """Return a value for each axis, None if there are none."""
-        layers: list[dict[int, tuple[int, int]]] = []
-        states = [self.every]
-        for _, masks in self.options:
-            few = smallest(masks)
-            budget.spend(len(few) * len(states) + 10)
-            step: dict[int, tuple[int, int]] = {}
-            for state in states:
-                for mask in few:
-                    step.setdefault(state & mask, (state, mask))
-            layers.append(step)
-            states = smallest(step)
-        if 0 not in states:
+        budget.spend(10 * len(self.options))
+        way = common([[*masks] for _, masks in self.options], self.every, budget)
+        if way is None:
             return None
-        state, result = 0, dict[str, Fraction]()
-        for (name, masks), step in zip(
-            reversed(self.options), reversed(layers), strict=True
-        ):
-            state, mask = step[state]
-            result[name] = masks[mask]
-        return result
+        pairs = zip(self.options, way, strict=True)
+        return {name: masks[mask] for (name, masks), mask in pairs}
 
 
 def _coupled_gap(base: Base, beside: Sequence[Sides], budget: Budget) -> Answer:

@@ -71,12 +71,11 @@ class Decider:
         return answer
 
     def _solved(self, question: Question, budget: Budget, last: Open) -> Answer:
-        from fuzzytree.auditing.decide.solver import solver_for
+        from fuzzytree.auditing.decide.solver import solver_for, without_solver
 
         solver = solver_for(self.base)
         if solver is None:
-            why = f"{last.why}; z3 is not installed, which might decide it"
-            return Open(why, last.code)
+            return without_solver(last)
         answer = solver.ask(question, budget)
         return last if isinstance(answer, Open) else answer
 

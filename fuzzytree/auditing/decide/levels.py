@@ -11,7 +11,8 @@ few literals and few levels, and the rivals that suffice for a proof come out wi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
@@ -144,28 +145,11 @@ class LevelView:
             if not masks:
                 return None
             options.append((axis.name, masks))
-        layers: list[dict[int, tuple[int, int]]] = []
-        states = [start]
-        for _, masks in options:
-            small = smallest(masks)
-            budget.spend(len(small) * len(states))
-            step: dict[int, tuple[int, int]] = {}
-            for state in states:
-                for mask in small:
-                    step.setdefault(state & mask, (state, mask))
-            layers.append(step)
-            states = smallest(step)
-            if len(states) > _MOST_LAYERS:
-                raise TooManyError
-        if 0 not in states:
+        way = common([[*masks] for _, masks in options], start, budget, _MOST_LAYERS)
+        if way is None:
             return None
-        state, result = 0, _Choice()
-        for (name, masks), step in zip(
-            reversed(options), reversed(layers), strict=True
-        ):
-            state, mask = step[state]
-            result[name] = masks[mask], mask
-        return result
+        pairs = zip(options, way, strict=True)
+        return {name: (masks[mask], mask) for (name, masks), mask in pairs}
 
     def _kept(self, axis: Axis, question: Question) -> int:
         """Return the rules that reach a level on an axis because ours do.
@@ -335,6 +319,39 @@ class _Search:
 
 def _bits(places: Iterable[int]) -> int:
     return sum(1 << place for place in set(places))
+
+
+def common(
+    options: Sequence[Sequence[int]], start: int, budget: Budget, most: float = math.inf
+) -> list[int] | None:
+    """Return one mask of each group, with no bit of a start in common; None if none.
+
+    `most`: of how many smallest masks it is given up.
+
+    Raises:
+        OutOfStepsError: If the budget is spent.
+        TooManyError: If there are more smallest masks.
+    """
+    layers: list[dict[int, tuple[int, int]]] = []
+    states = [start]
+    for masks in options:
+        small = smallest(masks)
+        budget.spend(len(small) * len(states))
+        step: dict[int, tuple[int, int]] = {}
+        for state in states:
+            for mask in small:
+                step.setdefault(state & mask, (state, mask))
+        layers.append(step)
+        states = smallest(step)
+        if len(states) > most:
+            raise TooManyError
+    if 0 not in states:
+        return None
+    state, result = 0, list[int]()
+    for step in reversed(layers):
+        state, mask = step[state]
+        result.append(mask)
+    return result[::-1]
 
 
 def smallest(masks: Iterable[int]) -> list[int]:

@@ -39,6 +39,11 @@ def solver_for(base: Base) -> Solver | None:
     return kept
 
 
+def without_solver(last: Open) -> Open:
+    """Return why something is open, and that z3 is not there to decide it."""
+    return Open(f"{last.why}; z3 is not installed, which might decide it", last.code)
+
+
 class Solver:
     """A base as terms of z3, strengths as variables within what bounds them.
 
