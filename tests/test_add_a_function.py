@@ -149,6 +149,7 @@ cannot write toy as python: it carries tree or rules, and this is a fuzzy system
 fuzzytree.convert makes rules of it
 javascript written
 structured-text written
+{smt}
 native agrees
 reference agrees
 native agrees
@@ -158,6 +159,11 @@ c agrees
 c agrees
 audit names it: True
 """
+CURVE = "cannot write toy as smt-lib: model.yaml: a curve (cauchy) is not known"
+AND = (
+    "cannot write toy as smt-lib: rule 1: not a minimum, product or maximum: AND is "
+    "cubic product and OR is maximum"
+)
 
 
 def _tried(tmp_path: Path, copy: Path, change: str) -> tuple[str, str]:
@@ -182,7 +188,7 @@ jfuzzylogic or iec
 fll curve product
 fis points product
 fml points product
-{COMMON}rechecked: 2
+{COMMON.format(smt=CURVE)}rechecked: 2
 """
     )
     assert "toy.yaml: a curve (cauchy) is not known\n" in errors
@@ -203,6 +209,6 @@ jfuzzylogic or iec rule block 1: the dialect portable has no AND 'cubic product'
 fll curve cubic product
 fis points cubic product
 fml curve cubic product
-{COMMON}rechecked: 0
+{COMMON.format(smt=AND)}rechecked: 0
 """
     )

@@ -156,6 +156,8 @@ def _variable(variable: Variable, units: UnitChange) -> Variable:
         missing=None
         if variable.missing is None
         else units.place(name, variable.missing),
+        is_whole=variable.is_whole
+        and all(units.place(name, value).is_integer() for value in (0.0, 1.0)),
     )
 
 
