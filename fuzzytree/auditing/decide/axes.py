@@ -28,8 +28,10 @@ from fuzzytree.auditing.decide.lines import (
     degree_within,
     lines_of,
     refined,
+    value_at,
 )
 from fuzzytree.auditing.decide.rules import Literal
+from fuzzytree.auditing.decide.stretches import Stretches
 from fuzzytree.model import Curve, IntArray, MembershipFunction
 from fuzzytree.numerics import degree_between
 
@@ -194,6 +196,11 @@ class Axis:
         """Where a function of a literal bends or jumps, and the ends, in order."""
         ends = self.low, self.high, self.least, self.largest
         return _sorted([*ends, *(x for one in self._distinct for x in one.x)])
+
+    @cached_property
+    def stretches(self) -> Stretches:
+        """The literals on stretches of the axis, in doubles."""
+        return Stretches(self)
 
     @cached_property
     def is_crossed(self) -> bool:
@@ -462,15 +469,6 @@ def literal_bounds(literal: Literal, x: Fraction) -> tuple[Fraction, Fraction]:
         low, high = 1 - high, 1 - low
     by = literal.lowered
     return literal.scale * low - by, literal.scale * high - by
-
-
-def value_at(lines: Lines, x: Fraction) -> Fraction:
-    """Return the value of lines at a place, beyond their ends that of the end."""
-    if x <= lines.x[0]:
-        return lines.at[0]
-    if x >= lines.x[-1]:
-        return lines.at[-1]
-    return lines.value(x)
 
 
 def _scaled(lines: Lines, by: Fraction) -> Lines:

@@ -13,7 +13,6 @@ from fuzzytree.auditing.decide.answers import (
     Question,
 )
 from fuzzytree.auditing.decide.base import Base
-from fuzzytree.auditing.decide.boxes import Stretches
 from fuzzytree.model import BoolArray, FloatArray
 from fuzzytree.numerics import U, outwards
 
@@ -136,7 +135,7 @@ class Field:
         self.inputs = [axis.name for axis in self.axes]
         self.axes += [axis for axis in fine.axes.values() if not axis.is_input]
         self.place = {axis.name: n for n, axis in enumerate(self.axes)}
-        self.stretches = [Stretches(axis) for axis in self.axes]
+        self.stretches = [axis.stretches for axis in self.axes]
         self.x = [np.array([*map(float, one.x)]) for one in self.stretches]
         self.is_double = [
             np.array([Fraction(float(x)) == x for x in one.x]) for one in self.stretches
@@ -231,15 +230,7 @@ class Field:
     @cached_property
     def _jumps(self) -> list[FloatArray]:
         """The knots of each axis at which a degree jumps."""
-        result = []
-        for stretch in self.stretches:
-            is_jump = np.zeros(stretch.last + 1, dtype=bool)
-            lines = [] if stretch.axis.values else [*stretch.sides.values()]
-            for at, after, before in (side for both in lines for side in both):
-                is_jump[:-1] |= at[:-1] != after
-                is_jump[1:] |= at[1:] != before
-            result.append(np.flatnonzero(is_jump).astype(float))
-        return result
+        return [stretch.jumps for stretch in self.stretches]
 
     def jumps(self, places: FloatArray) -> BoolArray:
         """Return which places are knots at which a degree jumps."""

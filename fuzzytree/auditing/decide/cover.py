@@ -23,11 +23,11 @@ from fuzzytree.auditing.decide.answers import (
     Proved,
     Question,
 )
-from fuzzytree.auditing.decide.axes import Axis, value_at
+from fuzzytree.auditing.decide.axes import Axis
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.claims import Claims, within
 from fuzzytree.auditing.decide.levels import LevelView, TooManyError, common
-from fuzzytree.auditing.decide.lines import Lines
+from fuzzytree.auditing.decide.lines import Lines, value_at
 from fuzzytree.auditing.decide.rules import Literal
 
 Sides = dict[str, tuple[Fraction, Fraction]]

@@ -26,6 +26,7 @@ from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.boxes import by_boxes
 from fuzzytree.auditing.decide.levels import by_levels
 
+_FEW = 200_000  # steps on boxes, before levels are asked about curves
 _LOOKS = 3  # sampled points that are evaluated in fractions
 
 
@@ -61,12 +62,15 @@ class Decider:
         rules = [base.rules[i] for i in question.rules]
         answer: Answer = Open("no method applies")
         is_lattice = all(rule.norm == "minimum" for rule in rules)
-        if is_lattice:
-            answer = by_levels(base, question, None, budget)
         is_settled = is_lattice and base.is_exact
+        if not base.is_exact and is_lattice and not base.is_coupled:
+            answer = by_boxes(base, question, budget, _FEW)
+        if isinstance(answer, Open) and is_lattice:
+            answer = by_levels(base, question, None, budget)
         if isinstance(answer, Open) and not base.is_coupled and not is_settled:
             answer = by_boxes(base, question, budget)
-        if isinstance(answer, Open) and (base.is_coupled or not is_lattice):
+        is_product = not is_lattice and base.is_exact  # curves leave it no more to say
+        if isinstance(answer, Open) and (base.is_coupled or is_product):
             return self._solved(question, budget, answer)
         return answer
 

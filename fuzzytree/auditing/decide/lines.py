@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple
@@ -69,6 +69,19 @@ class Lines(NamedTuple):
     def ends(self, piece: int) -> tuple[Fraction, Fraction]:
         """Return the values that a line, by number, has at its two ends."""
         return self.after[piece], self.before[piece]
+
+    def slope(self, x: Fraction) -> Fraction:
+        """Return the slope from a place on, up to the next knot."""
+        piece = min(bisect_right(self.x, x), len(self.x) - 1) - 1
+        if piece < 0:
+            return ZERO
+        p, q = self.ends(piece)
+        return (q - p) / (self.x[piece + 1] - self.x[piece])
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether it is the same between each two knots."""
+        return self.after == self.before
 
     @property
     def values(self) -> set[Fraction]:
@@ -331,6 +344,15 @@ def _line(chords: Sequence[_Chord], degrees: Mapping[Fraction, Fraction]) -> Lin
         tuple(one.p for one in chords),
         tuple(one.q for one in chords),
     )
+
+
+def value_at(lines: Lines, x: Fraction) -> Fraction:
+    """Return the value of lines at a place, beyond their ends that of the end."""
+    if x <= lines.x[0]:
+        return lines.at[0]
+    if x >= lines.x[-1]:
+        return lines.at[-1]
+    return lines.value(x)
 
 
 def refined(lines: Lines, xs: Sequence[Fraction]) -> Lines:

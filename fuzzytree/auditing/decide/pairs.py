@@ -25,10 +25,10 @@ from fuzzytree.auditing.decide.answers import (
     Proved,
     Question,
 )
-from fuzzytree.auditing.decide.axes import Axis, value_at
+from fuzzytree.auditing.decide.axes import Axis
 from fuzzytree.auditing.decide.claims import SPENT, Claims, within
 from fuzzytree.auditing.decide.levels import Interior, by_levels
-from fuzzytree.auditing.decide.lines import Lines, refined
+from fuzzytree.auditing.decide.lines import Lines, refined, value_at
 from fuzzytree.auditing.decide.rules import Literal
 from fuzzytree.model import FloatArray
 

@@ -9,8 +9,7 @@ from fractions import Fraction
 
 from fuzzytree.auditing.decide import Literal
 from fuzzytree.auditing.decide.answers import ZERO
-from fuzzytree.auditing.decide.axes import value_at
-from fuzzytree.auditing.decide.lines import Lines
+from fuzzytree.auditing.decide.lines import Lines, value_at
 from fuzzytree.auditing.decide.states import Span
 from fuzzytree.auditing.diff.agreement import Agreement, Side
 
