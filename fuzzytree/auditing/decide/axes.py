@@ -20,7 +20,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from fuzzytree.auditing.decide.answers import ONE, ZERO
+from fuzzytree.auditing.decide.answers import ONE, ZERO, Budget
 from fuzzytree.auditing.decide.lines import (
     Between,
     Hedged,
@@ -172,6 +172,21 @@ class Axis:
             result[literal] = self.kept[literal] = lower, upper
         return result
 
+    def peak(self, literal: Literal) -> Fraction:
+        """Return a value at which a literal is about as high as it gets."""
+        lines = self.parts[literal][0][0]
+        if self.values:
+            return max(self.values, key=lambda x: value_at(lines, x))
+        top = lines.highest
+        flat = [(a, b) for a, b, p, q in lines.pieces() if p == q == top]
+        spans = flat or [
+            (x, x) for x, v in zip(lines.x, lines.at, strict=True) if v == top
+        ]
+        a, b = max(spans or [(self.low, self.high)], key=lambda span: span[1] - span[0])
+        x = (max(a, self.low) + min(b, self.high)) / 2
+        near = Fraction(round(x)) if self.is_whole else Fraction(float(x))
+        return near if a <= near <= b else x
+
     @cached_property
     def is_exact(self) -> bool:
         """Whether all degrees are known exactly."""
@@ -201,6 +216,16 @@ class Axis:
     def stretches(self) -> Stretches:
         """The literals on stretches of the axis, in doubles."""
         return Stretches(self)
+
+    def arrange(self, budget: Budget) -> None:
+        """Look for crossings and knots, which takes steps at the first time.
+
+        Raises:
+            OutOfStepsError: If the budget is spent.
+        """
+        if "_arranged" not in vars(self):
+            count, size = len(self._distinct), len(self.bends)
+            budget.spend(count * size * (10 + (0 if self.values else count // 4)))
 
     @cached_property
     def is_crossed(self) -> bool:
@@ -274,8 +299,12 @@ class Axis:
         is_on = at < len(self.levels) and self.levels[at] == level
         return 2 * at + is_on
 
-    def cells(self, place: int) -> list[Cell]:
-        """Return the cells of the axis at a level, by its `place`; alike ones once."""
+    def cells(self, place: int, budget: Budget) -> list[Cell]:
+        """Return the cells of the axis at a level, by its `place`; alike ones once.
+
+        Raises:
+            OutOfStepsError: If the budget is spent.
+        """
         if place not in self._tables:
             at, is_on = divmod(place, 2)
             if is_on:
@@ -287,13 +316,18 @@ class Axis:
             else:
                 level = self.levels[0] - 1 if self.levels else ONE
             kept: dict[tuple[Masks, bool], Cell] = {}
-            for cell in self.cells_at(level):
+            for cell in self.cells_at(level, budget):
                 kept.setdefault((cell.masks, cell.is_wide), cell)
             self._tables[place] = [*kept.values()]
         return self._tables[place]
 
-    def cells_at(self, level: Fraction) -> Iterator[Cell]:
-        """Yield the cells at a level; of those with equal masks one at least."""
+    def cells_at(self, level: Fraction, budget: Budget) -> Iterator[Cell]:
+        """Yield the cells at a level; of those with equal masks one at least.
+
+        Raises:
+            OutOfStepsError: If the budget is spent.
+        """
+        budget.spend(4 * len(self.knots))
         ranks = self._ranks
         rank = ranks.of(level)
         for x in self.extra:

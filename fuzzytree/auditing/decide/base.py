@@ -131,6 +131,8 @@ class Base:
             if name in result.axes:
                 result.axes[name].kept = axis.kept
         vars(result)["samples"] = self.samples
+        added = result._sampled(range(self.count, len(rules)))
+        vars(result)["sampled"] = np.concatenate([self.sampled, added])
         return result
 
     def on(self, domain: Domain) -> Base:
@@ -201,6 +203,11 @@ class Base:
     def is_lattice(self) -> bool:
         """Whether all rules take the minimum."""
         return all(rule.norm == "minimum" for rule in self.rules)
+
+    @cached_property
+    def size(self) -> int:
+        """How many propositions the rules have."""
+        return sum(len(rule.literals) for rule in self.rules)
 
     @cached_property
     def used(self) -> tuple[Axis, ...]:
@@ -330,47 +337,59 @@ class Base:
     @cached_property
     def sampled(self) -> FloatArray:
         """The strengths at sampled points in doubles, shape (rules, points)."""
+        return self._sampled(range(self.count))
+
+    def _sampled(self, of: Sequence[int]) -> FloatArray:
         columns = dict(zip(self.inputs, self.samples, strict=True))
-        result = self.in_doubles(columns)
+        result = self.in_doubles(columns, of=of)
         if self.is_coupled:
             result[:, ~self._inside(columns)] = 0.0
         return result
 
     def in_doubles(
-        self, columns: Mapping[str, FloatArray], *, is_upper: bool = False
+        self,
+        columns: Mapping[str, FloatArray],
+        *,
+        of: Sequence[int] | None = None,
+        is_upper: bool = False,
     ) -> FloatArray:
         """Return about the lower or upper bounds of strengths, shape (rules, points).
 
         The points are in the domain; of each input its values.
         """
+        rules = [self.rules[n] for n in (range(self.count) if of is None else of)]
+        values: dict[str, FloatArray] = {}
         degrees: dict[tuple[str, Literal], FloatArray] = {}
         size = len(next(iter(columns.values()), np.zeros(SAMPLES)))
-        for axis in self.used:
-            x = np.full(size, float(axis.constant))
-            for name, weight in axis.weights.items():
-                x = x + float(weight) * columns[name]
-            for literal, sides in axis.parts.items():
-                pick = np.minimum if literal.negated else np.maximum
-                each = [lines_at(lines, x) for lines in sides[is_upper]]
-                degrees[axis.name, literal] = functools.reduce(pick, each)
-        result = np.empty((self.count, size))
-        for place, rule in enumerate(self.rules):
-            strength = np.full(size, float(rule.factor))
+        result = np.empty((len(rules), size))
+        for strength, rule in zip(result, rules, strict=True):
+            strength[:] = float(rule.factor)
+            join = np.multiply if rule.norm == "product" else np.minimum
             for key in rule.literals:
-                if rule.norm == "product":
-                    strength = strength * degrees[key]
-                else:
-                    strength = np.minimum(strength, degrees[key])
-            result[place] = strength
+                if key not in degrees:
+                    name, literal = key
+                    if name not in values:
+                        values[name] = self._in_doubles(self.axes[name], columns, size)
+                    pick = np.minimum if literal.negated else np.maximum
+                    parts = self.axes[name].parts[literal][is_upper]
+                    each = [lines_at(lines, values[name]) for lines in parts]
+                    degrees[key] = functools.reduce(pick, each)
+                join(strength, degrees[key], out=strength)
         return result
+
+    def _in_doubles(
+        self, axis: Axis, columns: Mapping[str, FloatArray], size: int
+    ) -> FloatArray:
+        x = np.full(size, float(axis.constant))
+        for name, weight in axis.weights.items():
+            x = x + float(weight) * columns[name]
+        return x
 
     def _inside(self, columns: Mapping[str, FloatArray]) -> BoolArray:
         inside = np.ones(SAMPLES, dtype=bool)
         for name, axis in self.axes.items():
             if not axis.is_input and self.domain.side(name) is not None:
-                x = np.full(SAMPLES, float(axis.constant))
-                for of, weight in axis.weights.items():
-                    x = x + float(weight) * columns[of]
+                x = self._in_doubles(axis, columns, SAMPLES)
                 inside &= (x >= float(axis.low)) & (x <= float(axis.high))
         return inside
 
@@ -389,6 +408,9 @@ def lines_at(lines: Lines, x: FloatArray) -> FloatArray:
     at = np.array([float(v) for v in lines.at])
     if len(xs) == 1:
         return np.full_like(x, at[0])
+    if lines.at[:-1] == lines.after and lines.at[1:] == lines.before:
+        heights: FloatArray = np.interp(x, xs, at)
+        return heights
     piece = np.clip(np.searchsorted(xs, x, "right") - 1, 0, len(xs) - 2)
     p = np.array([float(v) for v in lines.after])[piece]
     q = np.array([float(v) for v in lines.before])[piece]

@@ -33,7 +33,7 @@ STEPS = 4_000_000
 
 _SMALL = 2e-3  # of a piece between two knots: no box is halved further
 _MOST_SLIVERS = 500
-_LOOKS = 8  # boxes of each round whose middle is tried
+_MOST_LOOKS, _LOOKS = 256, 8  # middles of each round: tried in doubles, exactly
 
 
 class Boxes:
@@ -134,7 +134,7 @@ def search_boxes(
     seen = slivers = 0
     while len(boxes):
         try:
-            own.spend(len(boxes) * (10 + 4 * base.count))
+            own.spend(100 + base.count * (20 + len(boxes) // 2))
         except OutOfStepsError:
             if budget.is_spent:
                 raise
@@ -142,7 +142,7 @@ def search_boxes(
         seen += len(boxes)
         excluded = is_excluded(Boxes(base, stretches, boxes[:, 0], boxes[:, 1]))
         boxes = boxes[~excluded]
-        for middle in _middles(base, stretches, boxes[:_LOOKS], is_excluded):
+        for middle in _middles(base, stretches, boxes[:_MOST_LOOKS], is_excluded):
             pairs = zip(stretches.items(), middle, strict=True)
             values = {name: stretch.value(x) for (name, stretch), x in pairs}
             point = base.point(values)
@@ -174,7 +174,7 @@ def _middles(
     middles = np.where(has_values, np.round(middles), middles)
     if len(middles) and not any(axis.is_whole for axis in axes):
         middles = middles[~is_excluded(Boxes(base, stretches, middles, middles))]
-    result: list[list[float]] = middles.tolist()
+    result: list[list[float]] = middles[:_LOOKS].tolist()
     return result
 
 

@@ -29,7 +29,7 @@ from fuzzytree.auditing.decide.boxes import Boxes, search_boxes
 from fuzzytree.auditing.decide.decider import Decider
 from fuzzytree.model import BoolArray, FloatArray
 
-PART = 0.25
+PART = 0.1
 """The share of the steps that are left which a single question may take."""
 
 SPENT = Open("the budget was spent", "FTD03")
@@ -195,11 +195,14 @@ class Claims:
     ) -> Answer:
         from fuzzytree.auditing.decide.solver import solver_for, without_solver
 
-        solver = solver_for(self.base)
-        if solver is None:
-            return without_solver(last)
-        text = formula(solver.strengths, solver.z3)
-        return within(budget, lambda own: solver.ask_formula(text, holds, own, rules))
+        def ask(own: Budget) -> Answer:
+            solver = solver_for(self.base, own)
+            if solver is None:
+                return without_solver(last)
+            text = formula(solver.strengths, solver.z3)
+            return solver.ask_formula(text, holds, own, rules)
+
+        return within(budget, ask)
 
     # --- what changes without a rule, or without a proposition
 

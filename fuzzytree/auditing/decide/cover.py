@@ -19,6 +19,7 @@ from fuzzytree.auditing.decide.answers import (
     Answer,
     Budget,
     Open,
+    OutOfStepsError,
     Point,
     Proved,
     Question,
@@ -62,11 +63,11 @@ def _next(x: Fraction, to: float) -> Fraction:
 
 
 def _gap(base: Base, beside: Sequence[Sides], budget: Budget) -> Answer:
-    values = _Walk(base, beside, 0).values(budget)
+    values = _Walk(base, beside, 0, budget).values(budget)
     if values is None:
         return Proved("the stretches of 0 on all axes")
     if not base.is_exact:
-        values = _Walk(base, beside, 1).values(budget)
+        values = _Walk(base, beside, 1, budget).values(budget)
     point = None if values is None else base.point(values)
     if point is None or not base.contains(point):
         return Open("degrees are known within bounds alone", "FTD02")
@@ -80,13 +81,16 @@ class _Walk:
     that there is none, or the upper ones (1).
     """
 
-    def __init__(self, base: Base, beside: Sequence[Sides], side: int) -> None:
+    def __init__(
+        self, base: Base, beside: Sequence[Sides], side: int, budget: Budget
+    ) -> None:
         self.base, self.every = base, (1 << base.count + len(beside)) - 1
         self.options: list[tuple[str, dict[int, Fraction]]] = []
         names = dict.fromkeys(axis.name for axis in base.used)
         names |= dict.fromkeys(name for sides in beside for name in sides)
         for name in names:
             axis = base.axes[name]
+            budget.spend(len(axis.literals) ** 2 + 10)
             spans = [
                 (users, stretch)
                 for literal, users in axis.literals.items()
@@ -132,7 +136,7 @@ class _Walk:
 def _coupled_gap(base: Base, beside: Sequence[Sides], budget: Budget) -> Answer:
     from fuzzytree.auditing.decide.solver import solver_for
 
-    solver = solver_for(base)
+    solver = solver_for(base, budget)
     if solver is None:
         return Open("axes share inputs; z3 might decide it", "FTD04")
     z3, number = solver.z3, solver.number
@@ -304,8 +308,8 @@ def least_cover(claims: Claims, budget: Budget) -> tuple[Fraction, Fraction]:
     ends: Sequence[Fraction] = ()
     if base.is_lattice and base.is_exact and not base.is_coupled:
         try:
-            ends = LevelView(base, every).levels
-        except TooManyError:
+            ends = LevelView(base, every, budget).levels
+        except (TooManyError, OutOfStepsError):
             ends = ()
 
     if ends:

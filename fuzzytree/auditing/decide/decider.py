@@ -56,7 +56,7 @@ class Decider:
         base = self.base
         if base.is_empty:
             return Proved("the domain has no point")
-        point = self.sampled(question, budget)
+        point = self.sampled(question, budget) or self._peak(question, budget)
         if point is not None:
             return point
         rules = [base.rules[i] for i in question.rules]
@@ -77,7 +77,7 @@ class Decider:
     def _solved(self, question: Question, budget: Budget, last: Open) -> Answer:
         from fuzzytree.auditing.decide.solver import solver_for, without_solver
 
-        solver = solver_for(self.base)
+        solver = solver_for(self.base, budget)
         if solver is None:
             return without_solver(last)
         answer = solver.ask(question, budget)
@@ -87,6 +87,8 @@ class Decider:
 
     def sampled(self, question: Question, budget: Budget) -> Point | None:
         """Return a sampled point that answers a question, if there is one."""
+        if "sampled" not in vars(self.base):
+            budget.spend(60 * self.base.size)
         strengths = self.base.sampled
         size = strengths.shape[1]
         budget.spend(len(question.rules) * size // 500 + 10)
@@ -113,6 +115,20 @@ class Decider:
                 return Point(point, "a point that was drawn")
         return None
 
+    def _peak(self, question: Question, budget: Budget) -> Point | None:
+        """Return the point at which a rule is highest, if it answers a question."""
+        base = self.base
+        if len(question.reach) != 1 or base.is_coupled:
+            return None
+        literals = base.rules[question.reach[0]].literals
+        budget.spend(20 * sum(len(base.rules[i].literals) for i in question.rules))
+        values = {name: base.axes[name].peak(literal) for name, literal in literals}
+        point = base.point(values)
+        if point is None or not base.contains(point):
+            return None
+        is_answer = question.holds(*base.strengths(point, question.rules))
+        return Point(point, "where a rule is highest") if is_answer else None
+
     def exact(
         self, number: int, rules: Sequence[int], budget: Budget
     ) -> tuple[list[Fraction], list[Fraction]]:
@@ -120,7 +136,7 @@ class Decider:
         kept = self._exact.setdefault(number, {})
         more = [i for i in dict.fromkeys(rules) if i not in kept]
         if more:
-            budget.spend(20 * len(more))
+            budget.spend(20 * sum(len(self.base.rules[i].literals) for i in more))
             low, high = self.base.strengths(self.base.sample(number), more)
             kept.update({i: (low[i], high[i]) for i in more})
         low, high = [Fraction(0)] * self.base.count, [Fraction(0)] * self.base.count

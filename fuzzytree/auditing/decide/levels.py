@@ -56,15 +56,18 @@ class Interior(NamedTuple):
     axis: str = ""
     pieces: tuple[tuple[Fraction, Fraction], ...] = ()
 
-    def cells(self, axis: Axis, level: Fraction, *, is_at: bool) -> Iterator[Cell]:
+    def cells(
+        self, axis: Axis, level: Fraction, budget: Budget, *, is_at: bool
+    ) -> Iterator[Cell]:
         """Yield the cells of an axis; at the very level, or at one that is like it."""
         if axis.name == self.axis:
-            for cell in axis.cells_at(level):
+            for cell in axis.cells_at(level, budget):
                 if not cell.is_wide and any(a < cell.x < b for a, b in self.pieces):
                     yield cell
             return
         is_free = bool(axis.values) or axis.low == axis.high
-        cells = axis.cells_at(level) if is_at else axis.cells(axis.place(level))
+        place = 0 if is_at else axis.place(level)
+        cells = axis.cells_at(level, budget) if is_at else axis.cells(place, budget)
         yield from (cell for cell in cells if cell.is_wide or is_free)
 
 
@@ -72,7 +75,11 @@ class LevelView:
     """Some rules of a base that take the minimum, on axes with their literals alone."""
 
     def __init__(
-        self, base: Base, rules: Iterable[int], interior: Interior | None = None
+        self,
+        base: Base,
+        rules: Iterable[int],
+        budget: Budget,
+        interior: Interior | None = None,
     ) -> None:
         self.base, self.interior = base, interior
         self.rules = tuple(sorted(set(rules)))
@@ -92,8 +99,11 @@ class LevelView:
             for name, own in literals.items()
         ]
         self.factors = factors
+        budget.spend(10 * sum(map(len, literals.values())))
         if not all(axis.is_crossed for axis in self.axes):
             raise TooManyError
+        for axis in self.axes:
+            axis.arrange(budget)
 
     @cached_property
     def levels(self) -> list[Fraction]:
@@ -127,11 +137,11 @@ class LevelView:
             kept = self._kept(axis, question) if loose else 0
             masks: dict[int, Cell] = {}
             if self.interior is not None:
-                cells = [*self.interior.cells(axis, level, is_at=False)]
+                cells = [*self.interior.cells(axis, level, budget, is_at=False)]
             elif question.level is not None:
-                cells = [*axis.cells_at(level)]
+                cells = [*axis.cells_at(level, budget)]
             else:
-                cells = axis.cells(axis.place(level))
+                cells = axis.cells(axis.place(level), budget)
             budget.spend(2 * len(cells) + 4)
             for cell in cells:
                 mine = cell.masks.perhaps if loose else cell.masks.surely
@@ -163,14 +173,16 @@ class LevelView:
                     result |= self.alone.get((name, literal), 0)
         return result
 
-    def point(self, level: Fraction, choice: _Choice) -> dict[str, Fraction] | None:
+    def point(
+        self, level: Fraction, choice: _Choice, budget: Budget
+    ) -> dict[str, Fraction] | None:
         """Return a point in chosen cells, taken at the very level."""
         values: dict[str, Fraction] = {}
         for axis in self.axes:
             masks = choice[axis.name][0].masks
-            cells = axis.cells_at(level)
+            cells = axis.cells_at(level, budget)
             if self.interior is not None:
-                cells = self.interior.cells(axis, level, is_at=True)
+                cells = self.interior.cells(axis, level, budget, is_at=True)
             values[axis.name] = next(c.x for c in cells if c.masks == masks)
         return self.base.point(values)
 
@@ -210,7 +222,7 @@ class _Search:
 
     def _view(self) -> LevelView:
         rules = (*self.question.reach, *self.asked)
-        return LevelView(self.base, rules, self.interior)
+        return LevelView(self.base, rules, self.budget, self.interior)
 
     def run(self) -> Answer:
         is_open, ceiling = False, _TOP
@@ -288,7 +300,7 @@ class _Search:
     ) -> tuple[Point | None, int | None]:
         """Return a point if all holds there, or the strongest rival in the way."""
         question, base = self.question, self.base
-        point = self.view.point(level, choice)
+        point = self.view.point(level, choice, self.budget)
         if point is None or not base.contains(point):
             return None, None
         self.budget.spend(20 * len(question.rules))

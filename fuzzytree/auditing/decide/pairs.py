@@ -28,7 +28,7 @@ from fuzzytree.auditing.decide.answers import (
 from fuzzytree.auditing.decide.axes import Axis
 from fuzzytree.auditing.decide.claims import SPENT, Claims, within
 from fuzzytree.auditing.decide.levels import Interior, by_levels
-from fuzzytree.auditing.decide.lines import Lines, refined, value_at
+from fuzzytree.auditing.decide.lines import Lines, value_at
 from fuzzytree.auditing.decide.rules import Literal
 from fuzzytree.model import FloatArray
 
@@ -133,9 +133,20 @@ class Pairs:
 
     # --- how high two rules reach together
 
+    def most(self, budget: Budget) -> FloatArray:
+        """Return about how high each pair reaches together at most, by single axes.
+
+        Raises:
+            OutOfStepsError: If the budget is spent.
+        """
+        if "_most" not in vars(self):
+            for name, sets in self.sets.items():
+                bends = len(self.base.axes[name].bends) + 10
+                budget.spend(len({*sets}) ** 2 * bends // 200)
+        return self._most
+
     @cached_property
-    def most(self) -> FloatArray:
-        """About how high each pair reaches together at most, by single axes."""
+    def _most(self) -> FloatArray:
         factors = np.array([float(rule.factor) for rule in self.base.rules])
         result: FloatArray = np.minimum(factors[:, None], factors[None, :])
         for name, sets in self.sets.items():
@@ -151,11 +162,13 @@ class Pairs:
         result = np.ones((size, size))
         ends: dict[int, FloatArray] = {}
         for n, one in enumerate(sets):
-            lines = [upper for literal, _ in one for upper in axis.parts[literal][1]]
-            if len(lines) == 1 and not axis.values:
-                ends[n] = _ends(axis, lines[0])
-            elif not lines:
-                ends[n] = np.ones((2, 2 * len(axis.bends) + len(axis.extra)))
+            rows = [
+                row for literal, _ in one for row in axis.stretches.sides[literal][1]
+            ]
+            if len(rows) == 1 and not axis.values:
+                ends[n] = rows[0].ends
+            elif not rows:
+                ends[n] = np.ones((2, 2 * axis.stretches.last + 1))
         for n, one in enumerate(sets):
             for m in range(n, size):
                 if n in ends and m in ends:
@@ -165,18 +178,23 @@ class Pairs:
                     *(columns.most[columns.sets[k]] for k in (one, sets[m]))
                 )
                 result[n, m] = result[m, n] = least.max()
-        rows = [*ends]
-        if rows:
-            table = np.array([ends[n] for n in rows])
-            for n, (p, q) in zip(rows, table, strict=True):
-                u, v = table[:, 0], table[:, 1]
+        places = [*ends]
+        if places:
+            table = np.array([ends[n] for n in places])
+            for n, (p, q) in zip(places, table, strict=True):
+                some = np.flatnonzero(np.maximum(p, q) > 0.0)
+                if not len(some):
+                    result[n, places] = 0.0
+                    continue
+                p, q = p[some], q[some]
+                u, v = table[:, 0, some], table[:, 1, some]
                 best = np.maximum(np.minimum(p, u), np.minimum(q, v))
                 turn = (p - u) * (q - v) < 0  # they cross between the ends
                 share = np.where(
                     turn, (u - p) / np.where(turn, q - p - v + u, 1.0), 0.0
                 )
                 best = np.where(turn, np.maximum(best, p + (q - p) * share), best)
-                result[n, rows] = best.max(axis=1)
+                result[n, places] = best.max(axis=1)
         return result
 
     def common(self, i: int, j: int, level: Fraction, budget: Budget) -> Common:
@@ -273,7 +291,12 @@ class Pairs:
     def tie(self, i: int, j: int, budget: Budget) -> Answer:
         """Return whether two rules are as strong, and the strongest, on some width."""
         base, pair = self.base, (i, j)
-        if self.most[pair] <= 0.0:
+        try:
+            most = self.most(budget)[pair]
+            budget.spend(base.count // 8)
+        except OutOfStepsError:
+            return SPENT
+        if most <= 0.0:
             return Proved("they never fire together")
         rules = [base.rules[k] for k in pair]
         rest = tuple(k for k in range(base.count) if k not in pair)
@@ -282,7 +305,7 @@ class Pairs:
             axis: found for axis in base.used if (found := self._shared(axis, *pair))
         }
         levels = self._plateaus(i) & self._plateaus(j) if is_lattice else set()
-        levels = {t for t in levels if float(t) <= self.most[pair] + 1e-12}
+        levels = {t for t in levels if float(t) <= most + 1e-12}
         if not self._has_twins:
             if is_lattice and not levels and not pieces:
                 return APART
@@ -442,19 +465,6 @@ def _levels(axis: Axis, lines: Lines) -> set[Fraction]:
     if axis.values or len(lines.x) == 1:
         return {value_at(lines, x) for x in axis.values or lines.x}
     return {p for p, q in zip(lines.after, lines.before, strict=True) if p == q}
-
-
-def _ends(axis: Axis, lines: Lines) -> FloatArray:
-    """Return the values of lines at both ends of each stretch between bends."""
-    knots = [x for x in axis.bends if axis.low <= x <= axis.high]
-    fine = refined(lines, axis.bends)
-    first = axis.bends.index(knots[0])
-    rows = range(first, first + len(knots))
-    at = [fine.at[k] for k in rows] + [value_at(lines, x) for x in axis.extra]
-    after = [*at, *(fine.after[k] for k in rows[:-1])]
-    before = [*at, *(fine.before[k] for k in rows[:-1])]
-    spare = [Fraction(0)] * (2 * len(axis.bends) + len(axis.extra) - len(after))
-    return np.array([[float(v) for v in row + spare] for row in (after, before)])
 
 
 def _apart(columns: Columns, a: int, b: int, limit: Fraction) -> Distance:

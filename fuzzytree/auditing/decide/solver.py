@@ -27,14 +27,19 @@ RESOURCES = 1_000_000
 _PER_STEP = 1  # about so many of its resources take as long as a step
 
 
-def solver_for(base: Base) -> Solver | None:
-    """Return the solver of a base, which is made once; None without z3."""
+def solver_for(base: Base, budget: Budget) -> Solver | None:
+    """Return the solver of a base, which is made once; None without z3.
+
+    Raises:
+        OutOfStepsError: If the budget is spent.
+    """
     try:
         import z3
     except ImportError:
         return None
     kept: Solver | None = vars(base).get("solver")
     if kept is None:
+        budget.spend(500 * base.size)
         kept = vars(base)["solver"] = Solver(base, z3)
     return kept
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.auditing.decide.lines import Lines, refined, value_at
-from fuzzytree.model import FloatArray, IntArray
+from fuzzytree.model import BoolArray, FloatArray, IntArray
 from fuzzytree.numerics import U, outwards
 from fuzzytree.semantics import jet
 
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 _Pick = Callable[[FloatArray, FloatArray], FloatArray]
 
+_MOST_FRACTIONS = 50_000  # values at knots of an axis that are worked out exactly
+_TINY = 1e-300
 _JUMP = 2.0**-50  # a degree at a plateau's end is this near to that of its flank
 _ROUND = 1e-13  # more than a sum or product of a few doubles is rounded by
 
@@ -38,6 +40,12 @@ class _Row(NamedTuple):
     at: FloatArray
     after: FloatArray
     before: FloatArray
+
+    @property
+    def ends(self) -> FloatArray:
+        """The values at both ends of each knot and each stretch between two."""
+        after, before = [self.at, self.after], [self.at, self.before]
+        return np.array([np.concatenate(after), np.concatenate(before)])
 
 
 _Rows = tuple[list[_Row], list[_Row]]  # of the lower and the upper lines of a literal
@@ -58,6 +66,8 @@ class Stretches:
         self._floats = np.array([float(x) for x in self.x])
         off = [abs(x - Fraction(float(x))) for x in self.x]
         self._off = np.array([outwards(each)[1] for each in off])
+        count = len(axis.bends) * sum(len(parts[0]) for parts in axis.parts.values())
+        self._is_exact = axis.is_exact and count <= _MOST_FRACTIONS
         rows: dict[int, _Row] = {}
         self.sides: dict[Literal, _Rows] = {}
         for literal, parts in axis.parts.items():
@@ -75,7 +85,7 @@ class Stretches:
         if self.axis.values:
             at = np.array([float(value_at(lines, x)) for x in self.x])
             return _Row(at, at[:-1], at[1:])
-        row = self._exactly(lines) if self.axis.is_exact else self._nearly(lines)
+        row = self._exactly(lines) if self._is_exact else self._nearly(lines)
         if not beside:
             return row
         after = np.concatenate([row.after, row.at[-1:], beside[:-1]])
@@ -103,6 +113,8 @@ class Stretches:
         with np.errstate(divide="ignore", invalid="ignore"):
             share = (x - a) / (b - a)
         inside = np.where(p == q, p, p + (q - p) * share)
+        is_above = (p >= 0.0) & (q >= 0.0) & (p != q)  # so it is above 0 between them
+        inside = np.where(is_above, np.maximum(inside, _TINY), inside)
         off = self._off[:size] + (np.abs(a) + np.abs(b)) * U
         is_far = (p != q) & (np.abs(q - p) * off > (b - a) * _ROUND / 4)
         is_own = np.zeros(size, dtype=bool)
@@ -128,33 +140,31 @@ class Stretches:
         least = [self._extreme(row, low, high, is_most=False) for row in lower]
         most = [self._extreme(row, low, high, is_most=True) for row in upper]
         bottom, top = reduce(pick, least), reduce(pick, most)
-        off = self._rounding(literal, low, high)
-        return (
-            np.where(bottom >= 1.0, 1.0, np.clip(bottom - off, 0.0, None)),
-            np.where(top <= 0.0, 0.0, top + off),
-        )
-
-    def _rounding(
-        self, literal: Literal, low: FloatArray, high: FloatArray
-    ) -> FloatArray:
-        """Return how far degrees may be off: not at all where they are doubles."""
         if literal not in self._are_doubles:
             self._are_doubles[literal] = self._has_doubles(literal)
-        off = np.full_like(low, _ROUND)
-        if not self._are_doubles[literal] or not self.last:
-            return off
+        is_flat = self._is_flat(literal, low, high)
+        off = np.where(is_flat & self._are_doubles[literal], 0.0, _ROUND)
+        return (
+            np.where(bottom >= 1.0, 1.0, np.clip(bottom - off, 0.0, None)),
+            np.where((top <= 0.0) & is_flat, 0.0, np.maximum(top, 0.0) + off),
+        )
+
+    def _is_flat(
+        self, literal: Literal, low: FloatArray, high: FloatArray
+    ) -> BoolArray:
+        """Return whether the values at both ends are those at knots."""
         flat = np.ones(len(low), dtype=bool)
-        for row in itertools.chain(*self.sides[literal]):
+        for row in itertools.chain(*self.sides[literal]) if self.last else ():
             for end in (low, high):
                 piece = np.minimum(end.astype(int), self.last - 1)
                 is_flat = row.after[piece] == row.before[piece]
                 flat &= (end == np.floor(end)) | is_flat
-        return np.where(flat, 0.0, off)
+        return flat
 
     def _has_doubles(self, literal: Literal) -> bool:
         """Return whether degrees at knots are doubles, as far as they are known."""
         every = [*itertools.chain(*self.axis.parts[literal])]
-        if not self.axis.is_exact:
+        if not self._is_exact and not self.axis.values:
             return all(lines.is_flat for lines in every)
         xs = self.axis.bends
         fine = every if self.axis.values else [refined(lines, xs) for lines in every]

@@ -185,7 +185,7 @@ class Agreement:
             return []
         old, new = self.groups
         budget.spend(len(old) * len(new))
-        meeting = self._meeting(ONE if self._is_full(budget) else ZERO)
+        meeting = self._meeting(ONE if self._is_full(budget) else ZERO, budget)
         pairs = [Pair(i, j) for i in old for j in new if meeting[i] >> j & 1]
         if not self._is_full(budget):
             pairs += [Pair(None, j) for j in new]
@@ -214,7 +214,7 @@ class Agreement:
             )
         return self._full
 
-    def _meeting(self, level: Fraction) -> list[int]:
+    def _meeting(self, level: Fraction, budget: Budget) -> list[int]:
         """Return with which rules each may be above 0, or at 1, on a cell of each axis.
 
         Returns:
@@ -222,7 +222,7 @@ class Agreement:
         """
         bits = [self.base.every] * self.base.count
         for axis in self.base.used if self.is_made_of_lines else ():
-            cells = [cell.masks for cell in axis.cells_at(level)]
+            cells = [cell.masks for cell in axis.cells_at(level, budget)]
             masks = {one.perhaps if level else one.perhaps_above for one in cells}
             for place in range(self.base.count):
                 own = 0
@@ -432,7 +432,7 @@ class Agreement:
     def _by_solver(
         self, pairs: Sequence[Pair], budget: Budget, is_strict: bool
     ) -> Answer:
-        solver = solver_for(self.base)
+        solver = solver_for(self.base, budget)
         if solver is None:
             return Open("z3 is not installed, which might decide it")
         open_ = 0

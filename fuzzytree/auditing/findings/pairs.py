@@ -216,7 +216,7 @@ def _most(name: str, low: Fraction, high: Fraction) -> Measure:
 
 
 def _conflicts(subject: Subject) -> Iterator[AuditAnswer]:
-    level, most = Fraction(subject.settings.level), subject.pairs.most
+    level, most = Fraction(subject.settings.level), subject.pairs.most(subject.budget)
     near: list[tuple[float, Pair]] = []
     clean = hidden = listed = 0
     for pair in _pairs(subject):
