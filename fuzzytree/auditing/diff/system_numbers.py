@@ -312,7 +312,7 @@ class _Differences:
             "FT801.output-differs",
             name,
             state,
-            measures=(measure,),
+            measure,
             facts={**facts, "how": how},
         )
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import importlib
+import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple, cast
 
 import msgspec
+from msgspec.structs import replace
 
 from fuzzytree.auditing.decide import Budget, OutOfStepsError
 from fuzzytree.auditing.decide.answers import Progress
@@ -21,6 +21,7 @@ from fuzzytree.auditing.findings.codes import (
     AUDITED,
     CODES,
     FAMILIES,
+    Family,
     audit_answer,
 )
 from fuzzytree.auditing.findings.configuration import check_settings, chosen_codes
@@ -61,12 +62,9 @@ from fuzzytree.rechecking import (
     confirm,
 )
 
-FamilyFunction = Callable[[Subject], Iterator[AuditAnswer]]
-
 _BY_CONSTRUCTION = "not asked where true by construction of relative rules"
 _OF_RAW_RULES = "FT203"
 _RAW = "not asked, as raw rules are another model; --select FT203 compares them"
-_OF_A_ROW = "FT204"
 _LATE = "FTD03"
 _TOO_LARGE = "it needs more memory than there is"
 
@@ -92,8 +90,7 @@ def audit(
         row: A row whose nearest other decision is also sought.
         selection: The codes to answer; all by default.
         settings: The thresholds.
-        report: Called with what is done now, and with the share of all work that is
-            done, in [0, 1].
+        report: Called with what is done now, and with its share in [0, 1] of all.
         repeat: The command that repeats this audit.
 
     Raises:
@@ -117,15 +114,16 @@ def audit(
         reasons = dict.fromkeys(wanted & ANSWERED_BY_CONSTRUCTION, _BY_CONSTRUCTION)
     if viewed.raw is not None and not selection.select:
         reasons |= dict.fromkeys(wanted & {_OF_RAW_RULES}, _RAW)
-    progress = _Progress([*viewed.declined], {})
-    budget = Budget(int(settings.budget * 1e6), report=report)
+    answers, cut = [*viewed.declined], dict[str, str]()
     if viewed.rules is not None:
-        subject = subject_of(viewed, settings, budget, rows)
+        budget = Budget(int(settings.budget * 1e6), report=report)
+        subject = subject_of(viewed, settings, budget, rows, row)
         asked = {code for code in wanted if reasons.get(code) != _RAW}
-        _run_all([*_tasks(asked, row)], subject, progress)
+        _answer_all(subject, asked, answers, cut)
+    is_plain = [*viewed.numbers] == [*range(1, len(viewed.numbers) + 1)]
     words = Words(viewed.domain, model.variables)
-    worded = map(words.answer, progress.answers)
-    answers = tuple(_located(worded, wanted, viewed, material, repeat))
+    kept = sorted((a for a in answers if a.code in wanted), key=lambda a: a.code)
+    located = _located(map(words.answer, kept), viewed, material, repeat)
     result = Audit(
         version=version(),
         model=model.name,
@@ -137,30 +135,24 @@ def audit(
         policy=viewed.policy,
         domain=words.domain,
         settings=settings,
-        answers=answers,
-        unasked=tuple(_unasked(viewed.policy, wanted, progress, reasons)),
+        answers=tuple(located),
+        unasked=tuple(_unasked(viewed.policy, wanted, answers, cut, reasons)),
         limits=LIMITS,
-        is_complete=not progress.cut,
-        results=tuple(one.result for one in material.results),
-        numbers=() if _is_plain(viewed.numbers) else viewed.numbers,
+        is_complete=not cut,
+        results=tuple(loaded.result for loaded in material.results),
+        numbers=() if is_plain else viewed.numbers,
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
-    result = _confirmed(result, _audited(viewed, model))
-    ids = {one.id for one in result.findings}
+    subject_model = _audited(viewed, model)
+    confirmed = with_confirmations(
+        result.answers, lambda: confirm(*_for_solver(result, subject_model))
+    )
+    result = replace(result, answers=confirmed)
+    ids = {answer.id for answer in result.findings}
     accepted = tuple(sorted(ids.intersection(selection.accepted)))
-    result = msgspec.structs.replace(result, accepted=accepted)
-    return msgspec.structs.replace(result, digest=digest_of(result))
-
-
-def _confirmed(result: Audit, model: Document) -> Audit:
-    """Return an audit whose PROVED answers a solver confirms, if one is at hand."""
-
-    def confirmation() -> Report:
-        return confirm(*_for_solver(result, model))
-
-    answers = with_confirmations(result.answers, confirmation)
-    return msgspec.structs.replace(result, answers=answers)
+    result = replace(result, accepted=accepted)
+    return replace(result, digest=digest_of(result))
 
 
 def smt_text(result: Audit, model: Document) -> str:
@@ -186,8 +178,8 @@ def _audited(viewed: AuditView, model: Document) -> Document:
 
 def _for_solver(result: Audit, model: Document) -> tuple[bytes, bytes]:
     """Return an audit without places, and its model written anew."""
-    moved = (msgspec.structs.replace(one, places=()) for one in result.answers)
-    bare = msgspec.structs.replace(result, file=None, answers=tuple(moved))
+    moved = (replace(one, places=()) for one in result.answers)
+    bare = replace(result, file=None, answers=tuple(moved))
     return msgspec.json.encode(bare), find_format("yaml").write(model).content
 
 
@@ -202,36 +194,26 @@ def with_confirmations(
         report = confirmation()
     except (LossError, CannotRunError):
         return (*answers,)
-    result = [*answers]
-    for place, one in enumerate(answers):
-        if isinstance(one.state, Proved) and place in report.confirmed:
-            state = msgspec.structs.replace(
-                one.state, confirmed=report.confirmed[place]
+    result: list[AuditAnswer] = []
+    for place, answer in enumerate(answers):
+        if isinstance(answer.state, Proved) and place in report.refuted:
+            facts = {"code": answer.code, "detail": report.refuted[place]}
+            refuted = audit_answer(
+                "FT901.refuted",
+                answer.subject,
+                Computed("each PROVED answer was checked again"),
+                facts=facts,
+                rules=answer.rules,
+                terms=answer.terms,
             )
-            result[place] = msgspec.structs.replace(one, state=state)
-    for place, why in report.refuted.items():
-        if isinstance(answers[place].state, Proved):
-            result[place] = _refuted(answers[place], why)
-    return tuple(sorted(result, key=lambda one: one.code))
-
-
-def _refuted(answer: AuditAnswer, why: str) -> AuditAnswer:
-    """Return the finding that a solver refutes an answer."""
-    result = audit_answer(
-        "FT901.refuted",
-        answer.subject,
-        Computed("each PROVED answer was checked again"),
-        rules=answer.rules,
-        terms=answer.terms,
-        facts={"code": answer.code, "detail": why},
-    )
-    name = answer.id.replace(answer.code, result.code, 1)
-    return msgspec.structs.replace(
-        result,
-        id=name,
-        places=answer.places,
-        repeat=answer.repeat,
-    )
+            name = answer.id.replace(answer.code, refuted.code, 1)
+            places, repeat = answer.places, answer.repeat
+            answer = replace(refuted, id=name, places=places, repeat=repeat)
+        elif isinstance(answer.state, Proved) and place in report.confirmed:
+            state = replace(answer.state, confirmed=report.confirmed[place])
+            answer = replace(answer, state=state)
+        result.append(answer)
+    return tuple(sorted(result, key=lambda answer: answer.code))
 
 
 def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
@@ -258,128 +240,100 @@ def source_of(name: str, content: bytes) -> SourceFile:
     return SourceFile(writable(name), hashlib.sha256(content).hexdigest())
 
 
-class _Progress(NamedTuple):
-    """The answers so far, and by code why it was cut short or not begun."""
+def _answer_all(
+    subject: Subject,
+    wanted: Collection[str],
+    answers: list[AuditAnswer],
+    cut: dict[str, str],
+) -> None:
+    """Add the answers of all families, each within its part of the budget.
 
-    answers: list[AuditAnswer]
-    cut: dict[str, str]
-
-
-class _Task(NamedTuple):
-    """Questions that one function answers together."""
-
-    codes: Sequence[str]
-    run: FamilyFunction
-    part: float
-
-
-def _tasks(wanted: set[str], row: Mapping[str, float] | None) -> Iterator[_Task]:
-    """Yield the tasks in order: the user's row first, then the families."""
-    if row is not None and _OF_A_ROW in wanted:
-        yield _Task([_OF_A_ROW], functools.partial(_row_answers, row), 0.5)
-    for family in FAMILIES:
-        codes = [code for code in family.codes if code in wanted]
-        if codes:
-            run = functools.partial(_answers, family.function)
-            yield _Task(codes, run, family.part)
-
-
-def _answers(place: str, subject: Subject) -> Iterator[AuditAnswer]:
-    """Return what a function of a family yields; its module is imported here."""
-    module, _, name = place.partition(":")
-    family = importlib.import_module(f"fuzzytree.auditing.findings.{module}")
-    # Every function of the table has this type; a test calls each.
-    return cast("FamilyFunction", getattr(family, name))(subject)
-
-
-def _row_answers(row: Mapping[str, float], subject: Subject) -> Iterator[AuditAnswer]:
-    from fuzzytree.auditing.findings.robustness import row_answers
-
-    return row_answers(subject, row)
-
-
-def _run_all(tasks: Sequence[_Task], subject: Subject, progress: _Progress) -> None:
-    """Run all tasks, each within its part of the budget."""
-    why = f"the budget of {subject.settings.budget:g} million steps is spent"
-    budget = subject.budget
-    for position, task in enumerate(tasks):
-        part = 1.0 if position == len(tasks) - 1 else task.part
-        report = _reporter(budget, position, len(tasks))
-        share = budget.share(part, report=report)
+    `cut` gets the codes that were cut short or not begun, and why.
+    """
+    spent = f"the budget of {subject.settings.budget:g} million steps is spent"
+    codes = [[c for c in family.codes if c in wanted] for family in FAMILIES]
+    for number, family in enumerate(FAMILIES):
+        if not codes[number]:
+            continue
         try:
-            budget.check()
-            share.report(CODES[task.codes[0]].title, 0.0)
-            for answer in task.run(msgspec.structs.replace(subject, budget=share)):
-                progress.answers.append(answer)
-                state = answer.state
-                if isinstance(state, Declined) and state.code == _LATE:
-                    progress.cut[answer.code] = why
+            subject.budget.check()
+            own = _budget_part(subject, number, family.part)
+            own.report(CODES[codes[number][0]].title, 0.0)
+            for answer in family_function(family)(replace(subject, budget=own)):
+                answers.append(answer)
+                if isinstance(answer.state, Declined) and answer.state.code == _LATE:
+                    cut[answer.code] = spent
         except OutOfStepsError:
-            progress.cut.update(dict.fromkeys(task.codes, why))
+            cut.update(dict.fromkeys(codes[number], spent))
         except MemoryError:
-            progress.cut.update(dict.fromkeys(task.codes, _TOO_LARGE))
+            cut.update(dict.fromkeys(codes[number], _TOO_LARGE))
         except KeyboardInterrupt:
-            rest = [code for one in tasks[position:] for code in one.codes]
-            progress.cut.update(dict.fromkeys(rest, INTERRUPTED))
+            rest = itertools.chain.from_iterable(codes[number:])
+            cut.update(dict.fromkeys(rest, INTERRUPTED))
             return
 
 
-def _reporter(budget: Budget, position: int, count: int) -> Progress:
-    """Return a function that reports a family's progress as part of the whole."""
-    return lambda text, share: budget.report(text, (position + share) / count)
+def _budget_part(subject: Subject, number: int, part: float) -> Budget:
+    """Return the budget of a family, which reports its progress as part of all."""
+    budget, count = subject.budget, len(FAMILIES)
+    return budget.share(
+        1.0 if number == count - 1 else part,
+        report=lambda text, share: budget.report(text, (number + share) / count),
+    )
+
+
+def family_function(family: Family) -> Callable[[Subject], Iterator[AuditAnswer]]:
+    """Return the function of a family; its module is imported here."""
+    module, _, name = family.function.partition(":")
+    place = importlib.import_module(f"fuzzytree.auditing.findings.{module}")
+    function: Callable[[Subject], Iterator[AuditAnswer]] = getattr(place, name)
+    return function
 
 
 def _unasked(
-    policy: Policy, wanted: set[str], progress: _Progress, reasons: Mapping[str, str]
+    policy: Policy,
+    wanted: Collection[str],
+    answers: Sequence[AuditAnswer],
+    cut: Mapping[str, str],
+    reasons: Mapping[str, str],
 ) -> Iterator[str]:
     """Yield which codes have no answer and why, in order."""
-    answered = Counter(one.code for one in progress.answers)
+    answered = Counter(answer.code for answer in answers)
     for code in sorted(AUDITED):
         name = f"{code} {CODES[code].title}"
         if code not in wanted:
             yield f"{name}: left out by the user"
-        elif code in progress.cut:
+        elif code in cut:
             begun = "not run"
             if answered[code]:
                 begun = f"cut short after {counted(answered[code], 'answer')}"
-            yield f"{name}: {begun}: {progress.cut[code]}"
+            yield f"{name}: {begun}: {cut[code]}"
         elif code in reasons:
             yield f"{name}: {reasons[code]}"
         elif code in answered:
             continue
         elif policy.decision == "all" and CODES[code].decision == "strongest":
             yield f"{name}: not run: every rule takes part in the answer"
-        elif answered and all(one.startswith("FTD") for one in answered):
+        elif answered and all(other.startswith("FTD") for other in answered):
             yield f"{name}: all that it applies to was declined"
         else:
             yield f"{name}: nothing in this model that it applies to"
 
 
 def _located(
-    answers: Iterable[AuditAnswer],
-    wanted: Collection[str],
-    viewed: AuditView,
-    material: Material,
-    repeat: str,
+    answers: Iterable[AuditAnswer], viewed: AuditView, material: Material, repeat: str
 ) -> Iterator[AuditAnswer]:
-    """Yield the wanted answers with ids, places and the commands that repeat them."""
-    kept = sorted((a for a in answers if a.code in wanted), key=lambda a: a.code)
-    whole = viewed.rules, viewed.raw
-    representations = [rules for rules in whole if rules is not None]
-    for answer in with_ids(kept, representations, viewed.curves):
+    """Yield answers with ids, places and the commands that repeat them."""
+    representations = [rules for rules in (viewed.rules, viewed.raw) if rules]
+    for answer in with_ids(answers, representations, viewed.curves):
         numbers = [viewed.numbers[number - 1] for number in answer.rules]
         if not numbers and answer.subject in viewed.left_out:
             numbers = [viewed.left_out[answer.subject]]
-        yield msgspec.structs.replace(
+        yield replace(
             answer,
             places=locations_of(answer, material.model, material.file, numbers),
             repeat=f"{writable(repeat)} --select {answer.code}" if repeat else "",
         )
-
-
-def _is_plain(numbers: Sequence[int]) -> bool:
-    """Return whether the rules of a view are those of the model, one by one."""
-    return [*numbers] == [*range(1, len(numbers) + 1)]
 
 
 def _form(model: Document) -> str:

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from types import MappingProxyType
-from typing import Final, Literal, TypedDict, Unpack, cast
+from typing import Final, Literal, NamedTuple, cast
 
 import msgspec
 
@@ -26,17 +26,10 @@ from fuzzytree.rechecking import MESSAGES, names_in, sentence_of
 
 
 class Code(Value, frozen=True):
-    """A kind of question.
+    """A kind of question, and what `explain` says of it.
 
-    Attributes:
-        code: Its name in every output, which never changes its meaning.
-        title: What a finding says, in a few words.
-        severity: Of a finding, unless it says otherwise.
-        decision: `strongest` if it applies only where the strongest rule decides.
-        what: What a finding means, exactly.
-        why: Why a reader should care.
-        example: A small case.
-        remedy: What to do about it.
+    `severity` is that of a finding unless it says otherwise; `decision` is `strongest`
+    if the question applies only where the strongest rule decides.
     """
 
     code: str
@@ -59,37 +52,22 @@ def _codes() -> Mapping[str, Code]:
 CODES: Final = MappingProxyType(_codes())
 
 
-class Details(TypedDict, total=False):
-    """What an answer is about, and its numbers; see `AuditAnswer`."""
-
-    rules: tuple[int, ...]
-    terms: tuple[TermName, ...]
-    region: tuple[Span, ...]
-    measures: tuple[Measure, ...]
-
-
 def audit_answer(
     message: str,
     subject: str,
     state: State,
-    *,
+    *measures: Measure,
     facts: Mapping[str, FactValue] = MappingProxyType({}),
     is_finding: bool = True,
-    **details: Unpack[Details],
+    rules: tuple[int, ...] = (),
+    terms: tuple[TermName, ...] = (),
+    region: tuple[Span, ...] = (),
 ) -> AuditAnswer:
     """Return an answer with the sentence of a message.
 
-    Args:
-        message: Its name; see `fuzzytree.rechecking.sentences`. It says of which
-            code and severity the answer is, and whether it is a finding.
-        subject: The subject of the question.
-        state: How the answer is known; of messages `FTD` a `Declined` with the code.
-        facts: Those that the message says are kept.
-        is_finding: Where the message leaves it open whether it is one.
-        details: See `AuditAnswer`.
-
-    Raises:
-        KeyError: If there is no such message, or it needs another fact.
+    The message says of which code and severity the answer is, and whether it is a
+    finding; where it leaves that open, `is_finding` does. Of messages `FTD` the state
+    has the code. Of the facts those are kept that the message shows.
 
     Example:
         >>> state = Declined("FTD06", "rows are needed")
@@ -102,24 +80,22 @@ def audit_answer(
         code = state.code
     is_finding = is_finding and grade != "note"
     severity = cast("Severity", grade.rstrip("?") if is_finding else "info")
-    said = names_in(message)
+    names = names_in(message)
+    facts = {name: fact for name, fact in facts.items() if name in names}
     result = AuditAnswer(
         *(code, subject, "", state, is_finding, severity),
+        *(rules, terms, region, measures),
         message=message,
-        facts={name: fact for name, fact in facts.items() if name in said},
-        **details,
+        facts=facts,
     )
     return msgspec.structs.replace(result, sentence=sentence_of(result))
 
 
-class Family(Value, frozen=True):
+class Family(NamedTuple):
     """Codes that one function of this package answers.
 
-    Attributes:
-        function: The function, as `module:name`; it yields the answers for a subject.
-        codes: The codes.
-        part: The share of the remaining time that it may use; what it leaves goes to
-            the families after it.
+    `function` is `module:name`; `part` is the share of the remaining budget that it may
+    use, and what it leaves goes to the families after it.
     """
 
     function: str
@@ -128,21 +104,21 @@ class Family(Value, frozen=True):
 
 
 FAMILIES: Final = (
+    Family("robustness:row_answers", ("FT204",)),
     Family("terms:answers", ("FT401", "FT404"), 0.2),
     Family("support:answers", ("FT701",), 0.2),
-    Family("gaps:answers", ("FT301",), 0.2),
+    Family("deciding:cover_answers", ("FT301",), 0.2),
     Family("deciding:answers", ("FT101", "FT102", "FT103", "FT202")),
     Family("leaves:answers", ("FT101", "FT205")),
     Family("pairs:answers", ("FT104", "FT105", "FT106", "FT107", "FT201")),
-    Family("disagreement:answers", ("FT203",)),
+    Family("leaves:raw_answers", ("FT203",)),
     Family("terms:shape_answers", ("FT402",), 0.2),
     Family("terms:overlap_answers", ("FT403",), 0.2),
-    Family("complexity:answers", ("FT501",), 0.2),
+    Family("terms:size_answers", ("FT501",), 0.2),
     Family("robustness:answers", ("FT204",)),
-    Family("representations:answers", ("FT601", "FT602"), 1.0),
+    Family("representations:answers", ("FT601", "FT602")),
 )
-"""In the order of the audit: quick and severe questions first, so that a spent budget
-costs as little as it can."""
+"""In the order of the audit: quick and severe questions first, for a small budget."""
 
 ANSWERED_BY_CONSTRUCTION: Final = frozenset({"FT107", "FT201"})
 """Of relative rules: beside each cut both sides reach nearly 1, and a rule shortened by

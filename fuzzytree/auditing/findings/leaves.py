@@ -1,11 +1,20 @@
-"""What a tree decides where: the regions of its leaves."""
+"""What a tree decides where: the regions of its leaves, and where raw rules differ."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
+from typing import Final
 
-from fuzzytree.auditing.decide.domain import Domain, DomainSide
+import numpy as np
+
+from fuzzytree.auditing.decide.answers import Budget, OutOfStepsError, Point
+from fuzzytree.auditing.decide.answers import Proved as NoPoint
+from fuzzytree.auditing.decide.base import Base
+from fuzzytree.auditing.decide.contest import Contest, decided
+from fuzzytree.auditing.decide.costs import Costs
+from fuzzytree.auditing.decide.domain import Domain, DomainSide, contains, simplified
+from fuzzytree.auditing.decide.polytopes import Leaves
 from fuzzytree.auditing.decide.regions import (
     Interval,
     Region,
@@ -17,57 +26,44 @@ from fuzzytree.auditing.decide.regions import (
     point_in,
     regions,
 )
+from fuzzytree.auditing.decide.search import Search
 from fuzzytree.auditing.decide.states import (
     Claim,
     Declined,
     Proved,
     Span,
+    State,
     Witness,
     coordinates,
 )
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model import FuzzyTree
+from fuzzytree.auditing.findings.support import sampled_share
+from fuzzytree.model import BoolArray, FloatArray, FuzzyTree, RuleBase
+from fuzzytree.numerics import decide
 from fuzzytree.rechecking import listed, open_interval
 
-MOST_BOXES = 20_000
+MOST_BOXES: Final = 20_000
 """Boxes of all leaves together, beyond which a tree's regions are not looked at."""
 
-MOST_LISTED = 1000
+MOST_LISTED: Final = 1000
 """Boxes beyond which the regions of leaves are not listed."""
+
+_LEAF_PART = 0.25  # of the steps that are left, to compare a leaf with the raw rules
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
-    """Yield the region of each leaf, and the leaves that are never reached.
-
-    Models other than trees have no leaves.
-    """
+    """Yield where each leaf decides, or that it never does; only trees have leaves."""
     tree = subject.tree
     if tree is None:
         return
-    tree_regions = regions(tree)
-    declined = too_many_boxes(tree_regions)
+    declined = too_many_boxes(tree)
     if declined is not None:
         for code in ("FT101", "FT205"):
             yield audit_answer(f"{code}.leaves-declined", "leaves", declined)
         return
-    yield from leaf_regions(subject, tree, tree_regions)
-
-
-def too_many_boxes(tree_regions: Sequence[Region]) -> Declined | None:
-    """Return why the regions of a tree are not looked at, None if they are."""
-    count = sum(map(box_count, tree_regions))
-    if count <= MOST_BOXES:
-        return None
-    why = f"the leaves are made of {count} boxes, more than {MOST_BOXES}"
-    return Declined("FTD05", why)
-
-
-def leaf_regions(
-    subject: Subject, tree: FuzzyTree, tree_regions: Sequence[Region]
-) -> Iterator[AuditAnswer]:
-    """Yield where each leaf decides, or that it never does."""
+    tree_regions = regions(tree)
     live, count = 0, sum(map(box_count, tree_regions))
     if count > MOST_LISTED:
         why = f"the leaves are made of {count} boxes, more than {MOST_LISTED}"
@@ -75,8 +71,8 @@ def leaf_regions(
     for region in tree_regions:
         subject.budget.check()
         inside = [*boxes(region, tree, subject.domain)]
-        met = [(box, point_in(box, tree)) for box in inside]
-        parts = [(box, point) for box, point in met if point is not None]
+        places = [(box, point_in(box, tree)) for box in inside]
+        parts = [(box, point) for box, point in places if point is not None]
         if not parts:
             yield _unreached(subject, tree, region, len(inside))
             continue
@@ -91,6 +87,15 @@ def leaf_regions(
     yield audit_answer("FT101.leaves", "leaves", Proved(how), facts=facts)
 
 
+def too_many_boxes(tree: FuzzyTree) -> Declined | None:
+    """Return why the regions of a tree are not looked at, None if they are."""
+    count = sum(map(box_count, regions(tree)))
+    if count <= MOST_BOXES:
+        return None
+    why = f"the leaves are made of {count} boxes, more than {MOST_BOXES}"
+    return Declined("FTD05", why)
+
+
 def _region(
     subject: Subject,
     tree: FuzzyTree,
@@ -101,25 +106,24 @@ def _region(
 ) -> AuditAnswer:
     assert leaf_at(tree, point) == region.leaf  # a point of its box
     unions = dict(region.sides)
-    cut_sides = [side for side in box.sides if side.variable in unions]
-    hulls = [(side.variable, *side.ends) for side in cut_sides]
-    spans = tuple(Span(name, float(low), float(high)) for name, low, high in hulls)
-    ends = [
+    sides = [side for side in box.sides if side.variable in unions]
+    ends = tuple(
         (side.variable, *_ends(side, unions[side.variable], subject.domain))
-        for side in cut_sides
-    ]
+        for side in sides
+    )
+    spans = tuple(
+        Span(side.variable, float(side.ends[0]), float(side.ends[1])) for side in sides
+    )
     claim = Claim("decides", of="tree", label=region.label)
     share = share_of(box, tree, subject.domain)
-    measures = () if share is None else (Measure("share of the domain", share),)
-    state = Witness(coordinates(point), (claim,), spans)
     return audit_answer(
         "FT205.region",
         name,
-        state,
+        Witness(coordinates(point), (claim,), spans),
+        *(() if share is None else [Measure("share of the domain", share)]),
         rules=(region.leaf,),
         region=spans,
-        measures=measures,
-        facts={"then": region.label, "ends": tuple(ends)},
+        facts={"then": region.label, "ends": ends},
     )
 
 
@@ -145,12 +149,10 @@ def share_of(box: Domain, tree: FuzzyTree, domain: Domain) -> float | None:
     cut a polytope, whose volume is not worked out.
     """
     share = Fraction(1)
-    wholes = {side.variable: side for side in domain.sides}
-    combined = {variable.name for variable in tree.variables if variable.parts}
     for side in box.sides:
-        if side.variable in combined:
+        whole = domain.side(side.variable)
+        if whole is None or side.variable not in tree.inputs:
             return None
-        whole = wholes[side.variable]
         if values := listed(whole):
             share *= Fraction(len(listed(side) or side.values), len(values))
         elif whole.low < whole.high:
@@ -162,41 +164,157 @@ def share_of(box: Domain, tree: FuzzyTree, domain: Domain) -> float | None:
 def _unreached(
     subject: Subject, tree: FuzzyTree, region: Region, count: int
 ) -> AuditAnswer:
-    name = f"leaf {region.leaf}"
+    """Return that no input reaches a leaf, and why."""
     how = "the intervals on its path have nothing in common with the domain"
     if count:
         how = f"{count} boxes of combinations tested: no point of the inputs is in them"
-    message, facts = _reason(tree, region, subject.domain)
-    facts["leaf"] = region.leaf
-    return audit_answer(message, name, Proved(how), rules=(region.leaf,), facts=facts)
-
-
-def _reason(
-    tree: FuzzyTree, region: Region, domain: Domain
-) -> tuple[str, dict[str, FactValue]]:
-    """Return why no input reaches a leaf: the message, and what it says."""
+    names = (repr(name) for name, _ in region.sides if name not in tree.inputs)
+    message = "FT101.leaf-unmet"
+    facts: dict[str, FactValue] = {"variables": " and ".join(names)}
     for variable, union in region.sides:
+        side = subject.domain.side(variable)
         if not union:
-            return "FT101.leaf-excluded", {"variable": variable}
-        side = domain.side(variable)
-        if side is not None and not any(cut_side(side, one) for one in union):
+            message, facts = "FT101.leaf-excluded", {"variable": variable}
+            break
+        if side is not None and not any(cut_side(side, part) for part in union):
+            values = " or ".join(open_interval(low, high) for low, high in union)
             ends = {"low": side.low, "high": side.high}
-            values = values_text(union)
-            return "FT101.leaf-outside", {
-                "variable": variable,
-                "values": values,
-                **ends,
-            }
-    combined = {variable.name for variable in tree.variables if variable.parts}
-    names = [repr(name) for name, _ in region.sides if name in combined]
-    return "FT101.leaf-unmet", {"variables": " and ".join(names)}
+            message = "FT101.leaf-outside"
+            facts = {"variable": variable, "values": values, **ends}
+            break
+    return audit_answer(
+        message,
+        f"leaf {region.leaf}",
+        Proved(how),
+        rules=(region.leaf,),
+        facts={**facts, "leaf": region.leaf},
+    )
 
 
-def values_text(union: Union) -> str:
-    """Return values as people read them.
+# --- FT203: do raw rules decide as their tree does?
 
-    Example:
-        >>> values_text(((None, 0.5), (1.0, 2.0)))
-        'at most 0.5 or above 1 and at most 2'
+
+class TreeAndRules:
+    """A tree and its raw rules, compared with each other."""
+
+    def __init__(self, tree: FuzzyTree, raw: RuleBase, domain: Domain) -> None:
+        self.tree, self.raw, self.domain = tree, raw, domain
+        self.leaves, self.base = Leaves(tree, domain), Base.of(raw, domain)
+        self.costs = Costs(domain, tree.inputs)
+        labels = dict.fromkeys(self.leaves.labels)
+        self.contests = {label: Contest(self.base, label) for label in labels}
+
+    def differ(self, point: Mapping[str, Fraction]) -> bool:
+        """Return whether both decide differently at a point of the domain."""
+        label, _ = self.leaves.decided(point)
+        return label != decided(self.base, point)[0] and contains(
+            self.domain, self.tree.variables, point
+        )
+
+    def drawn(self) -> dict[int, dict[str, Fraction]]:
+        """Return for leaves a point that was drawn, at which both differ."""
+        values = np.array([[*map(float, column)] for column in self.base.samples])
+        leaves = decide(self.tree, values).rule
+        result: dict[int, dict[str, Fraction]] = {}
+        for place in np.flatnonzero(self.differing(values)).tolist():
+            leaf, point = int(leaves[place]), self.base.sample(place)
+            if leaf not in result and self.differ(point):
+                result[leaf] = point
+        return result
+
+    def differing(self, values: FloatArray) -> BoolArray:
+        """Return on which complete rows both differ, exactly; shape (rows,)."""
+        own = [leaf.label for leaf in self.tree.leaves]
+        other = [self.raw.semantics.uncovered, *(rule.then for rule in self.raw.rules)]
+        leaves = decide(self.tree, values).rule.tolist()
+        rules = decide(self.raw, values, with_strengths=False).rule.tolist()
+        pairs = zip(leaves, rules, strict=True)
+        return np.array(
+            [own[leaf - 1] != other[rule] for leaf, rule in pairs], np.bool_
+        )
+
+    def difference(
+        self, leaf: int, point: Mapping[str, Fraction] | None, budget: Budget
+    ) -> State:
+        """Return where both differ in a leaf, perhaps at a point; Proved if nowhere."""
+        is_spent = False
+        for part, number in enumerate(self.leaves.numbers):
+            box = self.leaves.boxes[part]
+            start = point_in(box, self.tree) if number == leaf else None
+            if point is not None or start is None:
+                continue
+            contest = self.contests[self.leaves.labels[part]]
+            search = Search(
+                contest, start, self.costs, budget, part=box, accepts=self.differ
+            )
+            try:
+                answer = search.any()
+            except OutOfStepsError:
+                is_spent = True
+                continue
+            if isinstance(answer, Point):
+                point = answer.values
+            is_spent |= not isinstance(answer, Point | NoPoint)
+        if point is None:
+            return Declined("FTD03", "the budget was spent") if is_spent else Proved("")
+        label = decided(self.base, point)[0]
+        near = simplified(
+            point,
+            self.domain,
+            lambda other: (
+                self.differ(other)
+                and self.leaves.decided(other)[1] == leaf
+                and decided(self.base, other)[0] == label
+            ),
+        )
+        own = Claim("decides", of="tree", label=self.leaves.decided(near)[0])
+        other = Claim("decides", of="raw rules", label=label)
+        return Witness(coordinates(near), (own, other))
+
+
+def raw_answers(subject: Subject) -> Iterator[AuditAnswer]:
+    """Yield where a tree and its raw rules differ, leaf by leaf, and on which rows.
+
+    Only trees with fitted sets have raw rules.
     """
-    return " or ".join(open_interval(low, high) for low, high in union)
+    tree, raw = subject.tree, subject.raw
+    if tree is None or raw is None:
+        return
+    declined = too_many_boxes(tree)
+    if declined is not None:
+        yield audit_answer("FT203.leaves-declined", "leaves", declined)
+        return
+    both = TreeAndRules(tree, raw, subject.domain)
+    drawn, alike, count = both.drawn(), 0, len(tree.leaves)
+    for leaf in range(1, count + 1):
+        subject.budget.report(f"leaf {leaf} against the raw rules", leaf / count)
+        budget = subject.budget.share(_LEAF_PART)
+        state = both.difference(leaf, drawn.get(leaf), budget)
+        name, rules = f"leaf {leaf}", [leaf]
+        if isinstance(state, Proved):
+            alike += 1
+        elif isinstance(state, Witness):
+            point = {one.input: Fraction(one.exact) for one in state.point}
+            other, place = decided(both.base, point)
+            if place is not None and place + 1 != leaf:
+                rules.append(place + 1)
+            facts = {"then": tree.leaves[leaf - 1].label, "other": other}
+            yield audit_answer(
+                "FT203.differs", name, state, rules=tuple(rules), facts=facts
+            )
+        else:
+            yield audit_answer("FT203.open", name, state, rules=(leaf,))
+    boxes_of_all = len(both.leaves.boxes)
+    how = f"all other decisions were sought in {boxes_of_all} boxes of the leaves"
+    leaves = {"alike": alike, "leaves": count}
+    yield audit_answer("FT203.leaves", "leaves", Proved(how), facts=leaves)
+    if subject.rows is not None:
+        values = subject.rows.values[:, np.isfinite(subject.rows.values).all(axis=0)]
+        if values.shape[1]:
+            what = "rows that raw rules decide differently"
+            hits, how = (
+                int(both.differing(values).sum()),
+                f"rows of {subject.rows.name}",
+            )
+            state = sampled_share(what, hits, values.shape[1], how)
+            yield audit_answer("FT203.rows", "rows", state)

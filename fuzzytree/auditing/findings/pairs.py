@@ -1,4 +1,4 @@
-"""Questions about two rules: is one subsumed, masked, a duplicate, or in conflict?"""
+"""Questions about two rules, such as one and itself without a proposition."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final
 
-from fuzzytree.auditing.decide import Open
+from fuzzytree.auditing.decide import BaseRule, Open, Point
 from fuzzytree.auditing.decide import Proved as NoPoint
+from fuzzytree.auditing.decide.claims import Claims
 from fuzzytree.auditing.decide.pairs import Common
 from fuzzytree.auditing.decide.states import (
     Bracket,
@@ -21,10 +22,14 @@ from fuzzytree.auditing.decide.states import (
     counted,
 )
 from fuzzytree.auditing.findings.codes import audit_answer
-from fuzzytree.auditing.findings.propositions import proposition_answers
-from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    FactValue,
+    Measure,
+    TermName,
+)
 from fuzzytree.auditing.findings.subject import Subject, state_of
-from fuzzytree.model import BoolArray
+from fuzzytree.model import Proposition, proposition_text
 from fuzzytree.numerics import outwards
 
 NEARLY: Final = Fraction(1, 10**6)
@@ -32,6 +37,9 @@ NEARLY: Final = Fraction(1, 10**6)
 
 MOST_SHOWN: Final = 20
 """The most conflicts that are listed one by one."""
+
+MOST_PROPOSITIONS: Final = 100
+"""The most propositions that matter that are listed one by one."""
 
 _CLOSE = 1e-9  # levels in doubles that are so near are compared in fractions
 
@@ -43,39 +51,25 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     if subject.base.is_empty:
         return
     yield from _hidden(subject)
-    yield from _copied(subject)
+    yield from _copies(subject)
     if subject.rules.kind != "relative":
         yield from _conflicts(subject)
     if subject.policy.decision == "strongest":
-        yield from proposition_answers(subject)
-
-
-def _then(subject: Subject, place: int) -> str:
-    return subject.base.rules[place].then
+        yield from _propositions(subject)
 
 
 def _pairs(subject: Subject) -> list[Pair]:
     """Return the pairs of rules; not two ways in which one rule of a system holds."""
-    every, numbers = range(subject.base.count), subject.numbers
-    return [
-        pair
-        for pair in itertools.combinations(every, 2)
-        if numbers[pair[0]] != numbers[pair[1]]
-    ]
-
-
-def _noun(subject: Subject) -> str:
-    return "class" if subject.policy.decision == "strongest" else "conclusion"
-
-
-def _both(subject: Subject, pair: Pair) -> str:
-    return " and ".join(subject.rule_name(place + 1) for place in pair)
+    numbers = subject.numbers
+    pairs = itertools.combinations(range(subject.base.count), 2)
+    return [(a, b) for a, b in pairs if numbers[a] != numbers[b]]
 
 
 def _facts(subject: Subject, pair: Pair) -> dict[str, FactValue]:
     """Return what two rules conclude, and what that is called."""
-    one, other = (_then(subject, place) for place in pair)
-    return {"noun": _noun(subject), "then": one, "other": other}
+    a, b = (subject.base.rules[place].then for place in pair)
+    is_class = subject.policy.decision == "strongest"
+    return {"noun": "class" if is_class else "conclusion", "then": a, "other": b}
 
 
 # --- FT104 and FT105: is one rule at least as strong everywhere?
@@ -83,87 +77,82 @@ def _facts(subject: Subject, pair: Pair) -> dict[str, FactValue]:
 
 def _hidden(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer which rules another one hides, of their class (FT104) or not (FT105)."""
-    claims, budget = subject.claims, subject.budget
+    claims, budget, rules = subject.claims, subject.budget, subject.base.rules
     budget.report("subsumed rule", 0.0)
     above = claims.drawn_above(budget)
     fires = [
         bool(above[place].any()) or not isinstance(claims.fires(place, budget), NoPoint)
         for place in range(subject.base.count)
     ]
-    kinds: dict[bool, list[Pair]] = {True: [], False: []}
-    for one, other in _pairs(subject):
-        if fires[one] and fires[other]:
-            is_alike = _then(subject, one) == _then(subject, other)
-            kinds[is_alike].append((one, other))
-    silent = len(fires) - sum(fires)
-    yield from _of_kind(subject, above, kinds[True], silent, is_alike=True)
-    if subject.policy.decision == "strongest":
-        yield from _of_kind(subject, above, kinds[False], silent, is_alike=False)
-
-
-def _of_kind(
-    subject: Subject,
-    above: BoolArray,
-    pairs: list[Pair],
-    silent: int,
-    *,
-    is_alike: bool,
-) -> Iterator[AuditAnswer]:
-    hiding: dict[int, list[int]] = {}
-    left: list[Open] = []
-    for pair in pairs:
-        for weak, strong in (pair[::-1], pair):
-            if above[weak, strong]:
-                continue
-            answer = subject.claims.above(
-                weak, strong, subject.budget, is_tied=not is_alike and weak < strong
-            )
-            if isinstance(answer, Open):
-                left.append(answer)
-            if isinstance(answer, NoPoint):
-                hiding.setdefault(weak, []).append(strong)
-                break
-    for weak, stronger in sorted(hiding.items()):
-        message, verb = "FT104.subsumed", "subsume"
-        if not is_alike:
-            verb = "mask"
-            message = "FT105.masked" if stronger[0] < weak else "FT105.weaker"
-        yield audit_answer(
-            message,
-            subject.rule_name(weak + 1),
-            Proved("levels, boxes or a solver: nowhere is it stronger"),
-            rules=(weak + 1, *(place + 1 for place in stronger)),
-            measures=(Measure(f"rules that {verb} it", len(stronger)),),
-            facts={
-                "by": subject.rule_name(stronger[0] + 1),
-                "noun": _noun(subject),
-                "then": _then(subject, stronger[0]),
-            },
+    for is_alike in (True, False)[: 1 + (subject.policy.decision == "strongest")]:
+        pairs = [
+            (a, b)
+            for a, b in _pairs(subject)
+            if fires[a] and fires[b] and (rules[a].then == rules[b].then) == is_alike
+        ]
+        if not pairs:
+            continue
+        hidden, left = dict[int, list[int]](), list[Open]()
+        for pair in pairs:
+            for weak, strong in (pair[::-1], pair):
+                if above[weak, strong]:
+                    continue
+                is_tied = not is_alike and weak < strong
+                answer = claims.above(weak, strong, budget, is_tied=is_tied)
+                if isinstance(answer, Open):
+                    left.append(answer)
+                if isinstance(answer, NoPoint):
+                    hidden.setdefault(weak, []).append(strong)
+                    break
+        yield from (
+            _hides(subject, weak, stronger, is_alike=is_alike)
+            for weak, stronger in sorted(hidden.items())
         )
-    if not pairs:
-        return
-    facts: dict[str, FactValue] = {"noun": _noun(subject)}
-    if hiding:
-        facts["listed"] = len(hiding)
-    state: State = Proved("of each, there is a point where it is the stronger one")
-    if left:
-        why = f"{counted(len(left), 'pair')}: {left[0].why}"
-        state = state_of(left[0]._replace(why=why))
-    measures = (
-        Measure("pairs", len(pairs)),
-        Measure("pairs too near to compare", len(left)),
-        Measure("rules that never fire", silent),
+        state: State = Proved("of each, there is a point where it is the stronger one")
+        if left:
+            why = f"{counted(len(left), 'pair')}: {left[0].why}"
+            state = state_of(left[0]._replace(why=why))
+        listed = {"listed": len(hidden)} if hidden else {}
+        yield audit_answer(
+            "FT104.others" if is_alike else "FT105.others",
+            "pairs of rules",
+            state,
+            Measure("pairs", len(pairs)),
+            Measure("pairs too near to compare", len(left)),
+            Measure("rules that never fire", fires.count(False)),
+            facts=_facts(subject, pairs[0]) | listed,
+        )
+
+
+def _hides(
+    subject: Subject, weak: int, stronger: list[int], *, is_alike: bool
+) -> AuditAnswer:
+    """Return that some rules, the first of them above all, hide a weak one."""
+    message, verb = "FT104.subsumed", "subsume"
+    if not is_alike:
+        message, verb = "FT105.weaker", "mask"
+        if stronger[0] < weak:
+            message = "FT105.masked"
+    return subject.answer(
+        message,
+        (weak, *stronger),
+        Proved("levels, boxes or a solver: nowhere is it stronger"),
+        Measure(f"rules that {verb} it", len(stronger)),
+        subject=subject.rule_name(weak + 1),
+        facts={
+            **_facts(subject, (stronger[0], weak)),
+            "by": subject.rule_name(stronger[0] + 1),
+        },
     )
-    message = "FT104.others" if is_alike else "FT105.others"
-    yield audit_answer(message, "pairs of rules", state, measures=measures, facts=facts)
 
 
 # --- FT106: do two rules have the same antecedent?
 
 
-def _copied(subject: Subject) -> Iterator[AuditAnswer]:
+def _copies(subject: Subject) -> Iterator[AuditAnswer]:
     pairs = _pairs(subject)
     copies, near = 0, 0
+    is_class = subject.policy.decision == "strongest"
     for pair in pairs:
         distance = subject.pairs.distance(*pair, NEARLY)
         if distance.low > NEARLY:
@@ -173,43 +162,26 @@ def _copied(subject: Subject) -> Iterator[AuditAnswer]:
             continue
         copies += 1
         facts = _facts(subject, pair)
-        decides = subject.policy.decision == "strongest"
-        message = "FT106.contradiction" if decides else "FT106.different"
-        measures: tuple[Measure, ...]
-        measures = (_most("largest distance", distance.low, distance.high),)
+        message = "FT106.contradiction" if is_class else "FT106.different"
+        if facts["then"] == facts["other"]:
+            message = "FT106.same"
+        exact = str(distance.low) if distance.low == distance.high else None
+        measures = [Measure("largest distance", float(distance.high), exact)]
         if distance.high and distance.axis:
-            variable = subject.base.variables[distance.axis]
             facts["variable"] = distance.axis
-            place = Measure("place of it", float(distance.at), unit=variable.unit)
-            measures = (*measures, place)
-        yield audit_answer(
-            "FT106.same" if facts["then"] == facts["other"] else message,
-            _both(subject, pair),
-            Proved("their degrees were compared axis by axis in fractions"),
-            rules=(pair[0] + 1, pair[1] + 1),
-            measures=measures,
-            facts=facts,
-        )
+            unit = subject.base.variables[distance.axis].unit
+            measures.append(Measure("place of it", float(distance.at), unit=unit))
+        state: State = Proved("their degrees were compared axis by axis in fractions")
+        yield subject.answer(message, pair, state, *measures, facts=facts)
     if not pairs:
         return
-    state: State = Proved(
-        f"somewhere their degrees differ by more than {float(NEARLY):g}"
-    )
+    state = Proved(f"somewhere their degrees differ by more than {float(NEARLY):g}")
     if near:
-        reason = f"{counted(near, 'pair')} of degrees are too near to compare"
-        state = Declined("FTD02", reason)
-    yield audit_answer(
-        "FT106.others",
-        "pairs of rules",
-        state,
-        measures=(Measure("pairs", len(pairs)),),
-        facts={"listed": copies} if copies else {},
-    )
-
-
-def _most(name: str, low: Fraction, high: Fraction) -> Measure:
-    """Return the upper bound of a number, with its fraction if it is known."""
-    return Measure(name, float(high), str(high) if low == high else None)
+        why = f"{counted(near, 'pair')} of degrees are too near to compare"
+        state = Declined("FTD02", why)
+    listed = {"listed": copies} if copies else {}
+    count = Measure("pairs", len(pairs))
+    yield audit_answer("FT106.others", "pairs of rules", state, count, facts=listed)
 
 
 # --- FT201: do rules of different classes reach a level together?
@@ -220,18 +192,16 @@ def _conflicts(subject: Subject) -> Iterator[AuditAnswer]:
     near: list[tuple[float, Pair]] = []
     clean = hidden = listed = 0
     for pair in _pairs(subject):
-        if _then(subject, pair[0]) == _then(subject, pair[1]):
-            continue
-        if not _may_conflict(subject, *pair):
+        if not _may_conflict(subject, pair):
             continue
         if most[pair] < float(level) - _CLOSE:
             clean += 1
         else:
             near.append((-most[pair], pair))
     near.sort()
-    for place, (_, pair) in enumerate(near):
+    for number, (_, pair) in enumerate(near):
         if listed == MOST_SHOWN and subject.base.is_lattice:
-            hidden += len(near) - place
+            hidden += len(near) - number
             break
         common = subject.pairs.common(*pair, level, subject.budget)
         if isinstance(common.answer, NoPoint):
@@ -242,71 +212,123 @@ def _conflicts(subject: Subject) -> Iterator[AuditAnswer]:
             listed += common.point is not None
             yield _conflict(subject, pair, common)
     if clean or hidden:
-        yield _rest_of_conflicts(subject, clean, hidden)
+        is_class = subject.policy.decision == "strongest"
+        nouns = "classes" if is_class else "conclusions"
+        yield audit_answer(
+            "FT201.unlisted" if hidden else "FT201.never",
+            "pairs of rules",
+            Proved("the largest common degrees on each axis, then all axes together"),
+            Measure("pairs that never do", clean),
+            Measure("pairs not listed", hidden),
+            facts={"level": subject.settings.level, "nouns": nouns},
+        )
 
 
-def _may_conflict(subject: Subject, one: int, other: int) -> bool:
-    """Return whether two rules say different things of one output."""
-    if subject.policy.decision == "strongest":
-        return True
-    thens = [_conclusions(subject, k) for k in (one, other)]
+def _may_conflict(subject: Subject, pair: Pair) -> bool:
+    """Return whether two rules say different things, of one output if all decide."""
+    rules = [subject.base.rules[place] for place in pair]
+    if rules[0].then == rules[1].then or subject.policy.decision == "strongest":
+        return rules[0].then != rules[1].then
+    thens: list[dict[str, set[str]]] = [{}, {}]
+    for rule, conclusions in zip(rules, thens, strict=True):
+        for text in rule.then.split(" and "):
+            for output, _ in rule.conclusions:
+                if text.startswith(f"{output} is "):
+                    conclusions.setdefault(output, set()).add(text)
     shared = thens[0].keys() & thens[1].keys()
     return any(thens[0][name] != thens[1][name] for name in shared)
 
 
-def _conclusions(subject: Subject, place: int) -> dict[str, set[str]]:
-    """Return what a rule says of each output."""
-    result: dict[str, set[str]] = {}
-    for text in _then(subject, place).split(" and "):
-        for output, _ in subject.base.rules[place].conclusions:
-            if text.startswith(f"{output} is "):
-                result.setdefault(output, set()).add(text)
-    return result
-
-
 def _conflict(subject: Subject, pair: Pair, common: Common) -> AuditAnswer:
-    both, facts = _both(subject, pair), _facts(subject, pair)
-    rules = pair[0] + 1, pair[1] + 1
-    high = outwards(common.high)[1]
+    facts, high = _facts(subject, pair), outwards(common.high)[1]
     most = Measure("highest common level at most", high)
     if common.point is None:
         why = common.answer.why if isinstance(common.answer, Open) else "not narrower"
-        of = f"the highest level that {both} reach"
-        state: State = Bracket(of, 0.0, high, why)
-        return audit_answer(
-            "FT201.may", both, state, rules=rules, measures=(most,), facts=facts
-        )
+        both = " and ".join(subject.rule_name(place + 1) for place in pair)
+        bracket = Bracket(f"the highest level that {both} reach", 0.0, high, why)
+        return subject.answer("FT201.may", pair, bracket, most, facts=facts)
     low, _ = subject.base.strengths(common.point.values, pair)
-    reached = min(low[place] for place in pair)
-    claim = Claim("reaches", rules=rules, level=str(reached))
-    state = Witness(coordinates(common.point.values), (claim,))
+    level = min(low[place] for place in pair)
+    rules = pair[0] + 1, pair[1] + 1
+    claims = (Claim("reaches", rules=rules, level=str(level)),)
+    state = Witness(coordinates(common.point.values), claims)
     facts["level"] = float(common.low)
-    if reached < common.low:  # a limit, at a jump
-        facts["falls short"] = float(common.low - reached)
-    exact = str(common.low) if common.low == common.high else None
-    measures: tuple[Measure, ...]
-    measures = (Measure("highest common level", float(common.low), exact),)
-    if exact is None:
-        least = Measure("highest common level at least", float(common.low))
-        measures = (least, most)
-    return audit_answer(
-        "FT201.conflict", both, state, rules=rules, measures=measures, facts=facts
-    )
+    if level < common.low:  # a limit, at a jump
+        facts["falls short"] = float(common.low - level)
+    least = Measure("highest common level at least", float(common.low))
+    if common.low == common.high:
+        exact = Measure("highest common level", float(common.low), str(common.low))
+        return subject.answer("FT201.conflict", pair, state, exact, facts=facts)
+    return subject.answer("FT201.conflict", pair, state, least, most, facts=facts)
 
 
-def _rest_of_conflicts(subject: Subject, clean: int, hidden: int) -> AuditAnswer:
-    is_class = _noun(subject) == "class"
-    facts: dict[str, FactValue] = {
-        "level": subject.settings.level,
-        "nouns": "classes" if is_class else "conclusions",
-    }
-    return audit_answer(
-        "FT201.unlisted" if hidden else "FT201.never",
-        "pairs of rules",
-        Proved("the largest common degrees on each axis, then all axes together"),
-        measures=(
-            Measure("pairs that never do", clean),
-            Measure("pairs not listed", hidden),
-        ),
-        facts=facts,
-    )
+# --- FT107: is some input classified differently without a proposition?
+
+
+def _propositions(subject: Subject) -> Iterator[AuditAnswer]:
+    """Answer for each proposition whether some decision changes without it."""
+    shorter = [*_shorter(subject)]
+    if not shorter:
+        return
+    count, budget = subject.base.count, subject.budget
+    base = subject.base.with_rules(rule for _, _, rule in shorter)
+    claims = Claims(base, subject.policy.uncovered)
+    silent = [
+        place
+        for place in range(count)
+        if isinstance(subject.claims.fires(place, budget), NoPoint)
+    ]
+    needed = 0
+    for number, (place, proposition, _) in enumerate(shorter):
+        if place in silent:
+            continue
+        budget.report("irrelevant proposition", number / len(shorter))
+        same, others = subject.claims.same(place), subject.claims.others(place)
+        answer = claims.changes(count + number, place, (place, *same), others, budget)
+        needed += isinstance(answer, Point)
+        if isinstance(answer, Point) and needed > MOST_PROPOSITIONS:
+            continue
+        name, text = subject.rule_name(place + 1), proposition_text(proposition)
+        facts: dict[str, FactValue] = {"rule": name, "proposition": text}
+        if isinstance(answer, Point):
+            message, before = "FT107.needed", subject.class_at(answer.values)
+            facts |= {"before": before, "then": base.rules[place].then}
+            claim = Claim("decides", label=before)
+            state: State = Witness(coordinates(answer.values), (claim,))
+        else:
+            state, message = state_of(answer), "FT107.open"
+            if isinstance(answer, NoPoint):
+                message = "FT107.irrelevant"
+        variable, title = proposition.variable, f"{name}, {text!r}"
+        terms = tuple(TermName(variable, term) for term in proposition.terms)
+        yield subject.answer(
+            message, [place], state, subject=title, terms=terms, facts=facts
+        )
+    for place in silent:
+        proof = Proved("one of its propositions is 0 on all of the domain")
+        yield subject.answer("FT107.silent", [place], proof)
+    if needed > MOST_PROPOSITIONS:
+        proof = Proved("an input was found for each, and evaluated in fractions")
+        more = Measure("propositions", needed - MOST_PROPOSITIONS)
+        yield audit_answer("FT107.more", "propositions", proof, more)
+
+
+def _shorter(subject: Subject) -> Iterator[tuple[int, Proposition, BaseRule]]:
+    """Yield positions of rules, a proposition of each, and the rule without it.
+
+    Of relative rules only propositions where one class is left: below a node of several
+    classes a rule that is shortened ties with all of them.
+    """
+    rules = subject.rules
+    classes: dict[tuple[Proposition, ...], set[str]] = {}
+    for rule in rules.rules:
+        for at in range(len(rule.when)):
+            classes.setdefault(rule.when[:at], set()).add(rule.then)
+    for place, rule in enumerate(rules.rules):
+        whole = subject.base.rules[place]
+        for at, proposition in enumerate(rule.when):
+            if rules.kind == "relative" and len(classes[rule.when[:at]]) > 1:
+                continue
+            literals = (*whole.literals[:at], *whole.literals[at + 1 :])
+            norm = whole.norm if len(literals) > 1 else "minimum"
+            yield place, proposition, whole._replace(literals=literals, norm=norm)

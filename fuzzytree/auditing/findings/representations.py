@@ -1,71 +1,86 @@
 """Do all representations of a model, in every installed runtime, answer as the model?
 
-Bits are compared on probes of every proposition, and on the rows. A certificate bounds
-what a number type can change on all of the domain, and a share of the rows, or of
-random points, shows how often that could matter.
+Bits are compared on probes of every proposition, on rows, and where runtimes usually
+differ: at ties, missing or infinite values, ends of curves, outside the domain. A
+certificate bounds what a number type can change on all of the domain.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Final, NamedTuple, cast
 
 import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.domain import Domain
-from fuzzytree.auditing.decide.states import Bracket, Computed, Declined, State
-from fuzzytree.auditing.findings import conventions
+from fuzzytree.auditing.decide.states import (
+    Bracket,
+    Claim,
+    Computed,
+    Declined,
+    Representation,
+    State,
+    Witness,
+    coordinates,
+)
 from fuzzytree.auditing.findings.codes import audit_answer
-from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.support import sample_points, sampled_share
-from fuzzytree.checking import check, probed
-from fuzzytree.model import Agreement, Basis, Certified, Comparison, Dtype, Model
-from fuzzytree.numerics import Certificate, certify
+from fuzzytree.auditing.findings.support import (
+    rows_outside,
+    sample_points,
+    sampled_share,
+)
+from fuzzytree.checking import check
+from fuzzytree.model import Agreement, Certified, Comparison, Dtype, FuzzyTree, Model
+from fuzzytree.numerics import TIE, Certificate, certify, decide, exact_answer
 from fuzzytree.runtimes import all_runtimes
-from fuzzytree.semantics import forms
+from fuzzytree.semantics import forms, probe_values
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray
     from fuzzytree.runtimes import OnnxModel
 
-
 PROBES: Final = 2_000
 """The most probes of a comparison."""
 
-_DTYPES: Final[Mapping[str, Dtype]] = MappingProxyType(
-    {"float64": "float64", "mixed": "mixed", "float32": "float32"}
-)
 _MOST_ROWS = 2_000  # rows or points that stand behind the probes
 
 
-def answers(subject: Subject) -> Iterator[AuditAnswer]:
-    """Compare all representations of a model with it.
+class Result(NamedTuple):
+    """What a check says, and its rows of generated values from the number `first` on.
 
-    Raises:
-        OutOfStepsError: If the budget is spent.
+    `values` has the shape (inputs, rows).
     """
+
+    agreement: Agreement
+    values: FloatArray
+    first: int = 0
+
+
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
+    """Compare all representations of a model with it, and bound what types change."""
     subject.budget.check()
-    values, how = _points(subject)
+    values, how = _rows(subject)
     result = agreement(subject, values)
-    yield from agreement_answers(subject, result, values)
-    if subject.system is None:
-        models = {str(name): form for name, form in forms(_model(subject)).items()}
-        for one in result.certificates:
-            subject.budget.check()
-            yield from _certified(
-                subject, one, models[one.representation.rpartition(" in ")[0]], how
-            )
-    yield from conventions.answers(subject)
+    yield from agreement_answers(subject, result)
+    yield from convention_answers(subject, result)
+    for certified in result.agreement.certificates:
+        subject.budget.check()
+        name = certified.representation.rpartition(" in ")[0]
+        yield from _certified(subject, certified, _forms(subject)[name], how)
 
 
-def _model(subject: Subject) -> Model:
-    return subject.rules if subject.tree is None else subject.tree
+def _forms(subject: Subject) -> dict[str, Model]:
+    if subject.system is not None:
+        return {}
+    model = subject.tree or subject.rules
+    return {str(name): form for name, form in forms(model).items()}
 
 
-def _points(subject: Subject) -> tuple[FloatArray, str]:
+def _rows(subject: Subject) -> tuple[FloatArray, str]:
     """Return the user's rows, or drawn points without, and where they come from."""
     settings = subject.settings
     most = min(settings.rows, _MOST_ROWS)
@@ -82,129 +97,189 @@ def _points(subject: Subject) -> tuple[FloatArray, str]:
 
 def agreement(
     subject: Subject, values: FloatArray, *others: Model | OnnxModel
-) -> Agreement:
-    """Return what a check finds of the model and its representations."""
-    every = all_runtimes()
-    if subject.system is not None:
-        names = [one.name for one in every if one.in_audits or one.is_definition]
-        return check(subject.system, data=values, runtimes=names, limit=PROBES)
-    names = [one.name for one in every if one.in_audits]
-    return check(_model(subject), *others, data=values, runtimes=names, limit=PROBES)
+) -> Result:
+    """Return what a check finds of the model and its representations.
+
+    Special values of a system stand behind its rows, those of rules among the probes.
+    """
+    system, model = subject.system, subject.tree or subject.rules
+    names = [
+        runtime.name
+        for runtime in all_runtimes()
+        if runtime.in_audits or (system is not None and runtime.is_definition)
+    ]
+    probes = probe_values(model if system is None else subject.rules, PROBES)
+    if system is None:
+        result = check(model, *others, data=values, runtimes=names, limit=PROBES)
+        return Result(result, probes)
+    data = np.hstack([values, probes])
+    result = check(system, data=data, runtimes=names, limit=PROBES)
+    return Result(result, probes, result.probes + values.shape[1])
 
 
-def agreement_answers(
-    subject: Subject, result: Agreement, values: FloatArray
-) -> Iterator[AuditAnswer]:
+# --- FT601: is there a disagreement?
+
+
+def agreement_answers(subject: Subject, result: Result) -> Iterator[AuditAnswer]:
     """Yield an answer for each disagreement of a check, and a summary of the rest."""
-    clean: dict[Basis, list[Comparison]] = {}
-    for one in result.comparisons:
-        if one.verdict in ("DISAGREES", "rows only"):
-            yield _disagreement(subject, one, values)
-        elif one.verdict == "agrees":  # raw rules differ from a tree by design: FT203
-            basis = "proof" if one.basis in ("file", "all cells") else one.basis
-            clean.setdefault(basis, []).append(one)
-    for basis, ones in clean.items():
-        yield _agreeing(basis, ones)
-    for text in result.skipped:
-        if text.startswith("all cells"):  # a proof covers them
-            continue
-        name = text.partition(" is not installed")[0].partition(": ")[0]
-        yield audit_answer("FT601.not-compared", name, Declined("FTD08", text))
+    clean: dict[str, list[Comparison]] = {}
+    for compared in result.agreement.comparisons:
+        if compared.verdict in ("DISAGREES", "rows only"):
+            yield _disagreement(subject, compared, result)
+        elif compared.verdict == "agrees":  # raw rules differ by design: FT203
+            is_proof = compared.basis in ("file", "all cells")
+            title = "proof" if is_proof else str(compared.basis)
+            clean.setdefault(title, []).append(compared)
+    messages = {"rows": "FT601.alike", "calls": "FT601.alike-by-calls"}
+    for title, group in clean.items():
+        parts = (
+            f"{c.representation} and {c.against}: {c.rows}, {c.origin}" for c in group
+        )
+        facts = {"count": len(group), "rows": max(c.rows for c in group)}
+        message, name = (
+            messages.get(title, "FT601.equal"),
+            f"representations, by {title}",
+        )
+        yield audit_answer(message, name, Computed("; ".join(parts)), facts=facts)
+    for text in result.agreement.skipped:
+        if not text.startswith("all cells"):  # a proof covers them
+            name = text.partition(" is not installed")[0].partition(": ")[0]
+            yield audit_answer("FT601.not-compared", name, Declined("FTD08", text))
 
 
-def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> AuditAnswer:
-    noun = "rows" if one.basis == "rows" else "ways"
-    facts = "; ".join(one.detail[:2])
-    state: State = Computed(f"both were run or read; {facts}")
-    if subject.system is None and one.row_numbers:
-        model = _model(subject)
-        models = {str(name): form for name, form in forms(model).items()}
-        form = models.get(_form(one), model)
-        rows = probed(model, values, PROBES).values
-        witness = conventions.witness(subject, form, rows[:, [*one.row_numbers]])
-        state = witness or state
-    measures = (
-        Measure("rows that differ", one.differing),
-        Measure("rows of another class", one.flips),
-        Measure("largest difference", one.largest_difference),
-    )
-    known: dict[str, FactValue]
-    known = {"against": one.against, "rows": one.rows, "noun": noun}
+def _disagreement(
+    subject: Subject, compared: Comparison, result: Result
+) -> AuditAnswer:
+    detail = "; ".join(compared.detail[:2])
+    facts = {
+        "against": compared.against,
+        "rows": compared.rows,
+        "noun": "rows" if compared.basis == "rows" else "ways",
+        **({"detail": detail} if detail else {}),
+    }
     return audit_answer(
         "FT601.disagrees",
-        one.representation,
-        state,
-        measures=measures,
-        facts=known | ({"detail": facts} if facts else {}),
+        compared.representation,
+        witness(subject, compared, result)
+        or Computed(f"both were run or read; {detail}"),
+        Measure("rows that differ", compared.differing),
+        Measure("rows of another class", compared.flips),
+        Measure("largest difference", compared.largest_difference),
+        facts=facts,
     )
 
 
-def _form(one: Comparison) -> str:
-    """Return the form of the model that a title names, after its runtime."""
-    return one.representation.rpartition(": ")[2]
+def witness(subject: Subject, compared: Comparison, result: Result) -> Witness | None:
+    """Return the first differing row in the domain, with the answer of a form."""
+    known = _forms(subject)
+    name = compared.representation.rpartition(": ")[2]
+    form = known.get(name) or next(iter(known.values()), None)
+    rows = [row for row in compared.row_numbers if row < result.values.shape[1]]
+    values = result.values[:, rows]
+    inside = ~rows_outside(subject.rules, subject.domain, values)
+    inside &= np.isfinite(values).all(axis=0)
+    if form is None or not inside.any():
+        return None
+    row = values[:, int(np.argmax(inside))].tolist()
+    point = dict(zip(form.inputs, row, strict=True))
+    of: Representation = "rules"
+    if isinstance(form, FuzzyTree):
+        of = "tree"
+    elif form.kind == "raw" and subject.tree is not None:
+        of = "raw rules"
+    claim = Claim("decides", of=of, label=exact_answer(form, point).label)
+    exact = {name: Fraction(x) for name, x in point.items()}
+    return Witness(coordinates(exact), (claim,))
 
 
-def _agreeing(basis: Basis, ones: Iterable[Comparison]) -> AuditAnswer:
-    """Return the answer that sums up comparisons in which nothing differs."""
-    ones = [*ones]
-    how = "; ".join(
-        f"{c.representation} and {c.against}: {c.rows}, {c.origin}" for c in ones
-    )
-    messages = {"rows": "FT601.alike", "calls": "FT601.alike-by-calls"}
-    return audit_answer(
-        messages.get(basis, "FT601.equal"),
-        f"representations, by {basis}",
-        Computed(how),
-        facts={"count": len(ones), "rows": max(one.rows for one in ones)},
-    )
+# --- FT602: do they agree where runtimes usually differ?
+
+
+def convention_answers(subject: Subject, result: Result) -> Iterator[AuditAnswer]:
+    """Yield for each convention which representation breaks it, or that none does."""
+    every = [c for c in result.agreement.comparisons if c.basis == "rows"]
+    alike = [c for c in every if c.verdict == "agrees"]
+    names = dict.fromkeys(name for c in alike for name in (c.representation, c.against))
+    for convention, rows in _conventions(subject, result.values).items():
+        numbers = {result.first + row for row in rows}
+        is_broken = False
+        for compared in every if numbers else ():
+            last = zip(compared.row_numbers[::-1], compared.detail[::-1], strict=False)
+            faults = [text for row, text in last if row in numbers]
+            if compared.verdict == "DISAGREES" and faults:
+                is_broken = True
+                title, against = compared.representation, compared.against
+                state: State = Computed(f"both were run; {faults[-1]}")
+                yield audit_answer(
+                    "FT602.differs",
+                    f"{convention}, {title}",
+                    witness(subject, compared, result) or state,
+                    facts={
+                        "convention": convention,
+                        "representation": title,
+                        "against": against,
+                        "detail": faults[-1],
+                    },
+                )
+        if not is_broken:
+            state = Computed(f"each generated row was answered by {', '.join(names)}")
+            message = "FT602.alike" if rows else "FT602.none"
+            counts = {"count": len(alike) + 1, "probes": len(rows)}
+            yield audit_answer(message, convention, state, facts=counts)
+
+
+def _conventions(subject: Subject, values: FloatArray) -> dict[str, Sequence[int]]:
+    """Return the rows that show each convention."""
+    is_finite = np.isfinite(values).all(axis=0)
+    is_missing = np.isnan(values).any(axis=0)
+    is_outside = is_finite & rows_outside(subject.rules, subject.domain, values)
+    masks = {
+        "missing values": is_missing,
+        "infinite values": ~is_finite & ~is_missing,
+        "far outside": is_outside,
+    }
+    if subject.system is None:
+        status = decide(subject.rules, values, with_strengths=False).status
+        masks["ties"] = status == TIE
+        masks["ends of curves and cuts"] = is_finite & ~is_outside
+    return {name: np.flatnonzero(mask).tolist() for name, mask in masks.items()}
 
 
 # --- what a number type can change
 
 
 def _certified(
-    subject: Subject, one: Certified, form: Model, how: str
+    subject: Subject, certified: Certified, form: Model, how: str
 ) -> Iterator[AuditAnswer]:
     """Yield the bound of a number type's error, and where it leaves a class open."""
-    name = one.representation
-    if one.verdict == "DISAGREES":
-        facts = {"detail": "; ".join(one.detail[:2])}
-        compared = Computed("each row was compared with its exact answer")
-        yield audit_answer("FT601.exceeds", name, compared, facts=facts)
-    bound = certify(_within(form, subject.domain), _DTYPES[one.dtype])
+    name = certified.representation
+    if certified.verdict == "DISAGREES":
+        facts = {"detail": "; ".join(certified.detail[:2])}
+        state: State = Computed("each row was compared with its exact answer")
+        yield audit_answer("FT601.exceeds", name, state, facts=facts)
+    bound = certify(_within(form, subject.domain), cast("Dtype", certified.dtype))
     measures = []
     if bound.delta is not None:
         measures.append(Measure("certified error of a strength", bound.delta))
         measures.append(Measure("margin that is certain", 2.0 * bound.delta))
-    if one.largest is not None:
-        measures.append(Measure("largest error seen", one.largest))
-    yield audit_answer(
-        "FT601.certified",
-        name,
-        _bounded(bound, one),
-        measures=tuple(measures),
-        facts={"bound": bound.sentence},
-    )
-    if one.on == "data" and one.rows:
+    if certified.largest is not None:
+        measures.append(Measure("largest error seen", certified.largest))
+    state = _bounded(bound, certified)
+    facts = {"bound": bound.sentence}
+    yield audit_answer("FT601.certified", name, state, *measures, facts=facts)
+    if certified.on == "data" and certified.rows:
         noun = "rows" if subject.rows is not None else "points"
-        share = sampled_share(
-            f"{noun} within the band of {name}", one.in_band, one.rows, how
-        )
-        yield audit_answer(
-            "FT601.band",
-            f"{name}, its band",
-            share,
-            facts={"representation": name, "noun": noun},
-        )
+        of, hits = f"{noun} within the band of {name}", certified.in_band
+        state = sampled_share(of, hits, certified.rows, how)
+        facts = {"representation": name, "noun": noun}
+        yield audit_answer("FT601.band", f"{name}, its band", state, facts=facts)
 
 
-def _bounded(bound: Certificate, one: Certified) -> State:
-    origin = bound.origin.replace("the declared ranges", "the domain")
+def _bounded(bound: Certificate, certified: Certified) -> State:
     if bound.delta is not None or not bound.reasons:
-        return Computed(origin)
-    largest = one.largest or 0.0
-    of = f"the largest error of a strength of {one.representation}"
-    return Bracket(of, largest, 1.0, "; ".join(bound.reasons))
+        return Computed(bound.origin.replace("the declared ranges", "the domain"))
+    of = f"the largest error of a strength of {certified.representation}"
+    return Bracket(of, certified.largest or 0.0, 1.0, "; ".join(bound.reasons))
 
 
 def _within(form: Model, domain: Domain) -> Model:

@@ -1,41 +1,60 @@
-"""How far a row is from the nearest other decision: its certified radius."""
+"""How far rows are from another decision, and gaps from rows."""
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
+import numpy as np
+from msgspec.structs import replace
+
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.contest import decided
-from fuzzytree.auditing.decide.costs import Nearest
-from fuzzytree.auditing.decide.domain import contains, simplified, variable_value
+from fuzzytree.auditing.decide.costs import Costs, Nearest
+from fuzzytree.auditing.decide.domain import (
+    Domain,
+    DomainSide,
+    contains,
+    simplified,
+    variable_value,
+)
+from fuzzytree.auditing.decide.domain import span as ends_on
 from fuzzytree.auditing.decide.nearest import nearest
-from fuzzytree.auditing.decide.polytopes import Leaves
-from fuzzytree.auditing.decide.regions import regions
+from fuzzytree.auditing.decide.polytopes import Leaves, Polytopes, polytope_of
 from fuzzytree.auditing.decide.states import (
     Bracket,
     Claim,
     Declined,
     Proved,
     Representation,
+    Span,
     State,
     Witness,
     coordinates,
+    point_of,
 )
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
-from fuzzytree.auditing.findings.rows import (
-    DomainRows,
-    distance_measure,
-    narrowed_state,
-    points_of,
-    rows_left_out,
-)
-from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.numerics import outwards
+from fuzzytree.auditing.findings.subject import AuditRows, Subject
+from fuzzytree.model import Variable
+from fuzzytree.numerics import decide, outwards
+
+MOST_ROWS = 50
+"""Rows whose radius is sought by strengths."""
+
+MOST_ROWS_OF_TREE = 1000
+"""Rows whose radius is sought by regions, which is quick."""
+
+SHOWN_ROWS = 5
+"""Rows of the smallest radius that have an answer of their own."""
+
+_PART = 0.9  # of the steps, to seek; the rest is for other codes
+_MOST_NAMED = 4  # inputs in a sentence
+_MOST_DIGITS = 80  # of an exact number beside a double
 
 
 class RowDecider:
@@ -59,69 +78,22 @@ class RowDecider:
         return own, "no rule" if place is None else self.subject.rule_name(place + 1)
 
 
-MOST_ROWS = 50
-"""Rows whose radius is sought by strengths."""
-
-MOST_ROWS_OF_TREE = 1000
-"""Rows whose radius is sought by regions, which is quick."""
-
-SHOWN_ROWS = 5
-"""Rows of the smallest radius that have an answer of their own."""
-
-_PART = 0.9  # of the steps, to seek; the rest is for other codes
-_MOST_NAMED = 4  # inputs in a sentence
+# --- the row of the user
 
 
-# --- a row
-
-
-def radius(subject: Subject, row: Mapping[str, float]) -> AuditAnswer:
-    """Return how far the nearest point is that is decided otherwise than a row.
-
-    Raises:
-        ValueError: If the row lies outside the domain.
-    """
-    point = _point(subject, row)
-    decider = RowDecider(subject)
-    result = nearest(decider.base, point, budget=subject.budget)
-    return _answer(decider, "the row", point, result)
-
-
-def row_answers(subject: Subject, row: Mapping[str, float]) -> Iterator[AuditAnswer]:
+def row_answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Yield how a row is decided, and how far the nearest other decision is.
 
     Raises:
         ValueError: If the row lies outside the domain.
     """
+    if subject.row is None:
+        return
     declined = _declined(subject)
     if declined is not None:
         yield audit_answer("FT204.not-sought", "row", declined)
         return
-    point = _point(subject, row)
-    decider = RowDecider(subject)
-    label, by = decider.decided(point)
-    claim = Claim("decides", of=decider.of, label=label)
-    yield audit_answer(
-        "FT204.decided",
-        "row",
-        Witness(coordinates(point), (claim,)),
-        facts={"then": label, "by": by},
-    )
-    yield radius(subject, row)
-
-
-def _declined(subject: Subject) -> Declined | None:
-    """Return why rows of a model are declined, None if they are not."""
-    if subject.policy.decision != "strongest":
-        why = "every rule takes part in the answer, so that no class decides"
-        return Declined("FTD07", why)
-    if not subject.is_whole:
-        return Declined("FTD07", "rules are left out that may decide")
-    return None if subject.tree is None else too_many_boxes(regions(subject.tree))
-
-
-def _point(subject: Subject, row: Mapping[str, float]) -> dict[str, Fraction]:
-    point = {name: Fraction(float(row[name])) for name in subject.rules.inputs}
+    point = {name: Fraction(float(subject.row[name])) for name in subject.rules.inputs}
     for variable in subject.rules.variables:
         side = subject.domain.side(variable.name)
         if not contains(subject.domain, [variable], point) and side is not None:
@@ -131,25 +103,39 @@ def _point(subject: Subject, row: Mapping[str, float]) -> dict[str, Fraction]:
                 f"{side.low!r} to {side.high!r}; "
                 f"widen it (--limits '{variable.name}=LOW:HIGH')"
             )
-    return point
+    decider = RowDecider(subject)
+    label, by = decider.decided(point)
+    state = Witness(coordinates(point), (Claim("decides", of=decider.of, label=label),))
+    yield audit_answer("FT204.decided", "row", state, facts={"then": label, "by": by})
+    result = nearest(decider.base, point, budget=subject.budget)
+    yield _radius(decider, "the row", point, result)
 
 
-def _answer(
+def _declined(subject: Subject) -> Declined | None:
+    """Return why rows of a model are declined, None if they are not."""
+    if subject.policy.decision != "strongest":
+        why = "every rule takes part in the answer, so that no class decides"
+        return Declined("FTD07", why)
+    if not subject.is_whole:
+        return Declined("FTD07", "rules are left out that may decide")
+    return None if subject.tree is None else too_many_boxes(subject.tree)
+
+
+def _radius(
     decider: RowDecider, name: str, point: Mapping[str, Fraction], result: Nearest
 ) -> AuditAnswer:
+    """Return how far a point is from another decision."""
     own, _ = decider.decided(point)
     facts: dict[str, FactValue] = {"name": name, "then": own}
     title = name.removeprefix("the ")
     what = f"the distance from {name} to another decision"
-    state: State
     if result.point is None or result.high is None:
         if result.is_none:
-            state = Proved("other decisions were sought on the whole domain")
-            return audit_answer("FT204.alike", title, state, facts=facts)
-        state = Bracket(what, outwards(result.low)[0], 1.0, result.why)
-        return audit_answer("FT204.none-known", title, state, facts=facts)
+            proof = Proved("other decisions were sought on the whole domain")
+            return audit_answer("FT204.alike", title, proof, facts=facts)
+        bracket = Bracket(what, outwards(result.low)[0], 1.0, result.why)
+        return audit_answer("FT204.none-known", title, bracket, facts=facts)
     other, _ = decider.decided(result.point)
-    claim = Claim("decides", of=decider.of, label=other)
     moved = [axis for axis, value in result.point.items() if value != point[axis]]
     near = simplified(
         {axis: result.point[axis] for axis in moved},
@@ -161,13 +147,40 @@ def _answer(
     message = "FT204.nearest"
     if len(moved) > _MOST_NAMED:
         message, facts["moved"] = "FT204.nearest-of-many", len(moved)
-    state = narrowed_state(what, result.low, result, [claim], result.why)
-    low = distance_measure("certified radius", result.low)
-    measures = low, distance_measure("distance of the witness", result.high)
-    return audit_answer(message, title, state, measures=measures, facts=facts)
+    claims = (Claim("decides", of=decider.of, label=other),)
+    at, high = coordinates(result.point), outwards(result.high)[1]
+    state: State = Witness(at, claims)
+    if not result.is_narrow:
+        low = outwards(result.low)[0]
+        state = Bracket(what, low, high, result.why, at, claims)
+    return audit_answer(
+        message,
+        title,
+        state,
+        distance_measure("certified radius", result.low),
+        distance_measure("distance of the witness", result.high),
+        facts=facts,
+    )
+
+
+def distance_measure(name: str, value: Fraction) -> Measure:
+    """Return a distance in widths of the inputs' ranges, with the exact one if short.
+
+    Where it is not, the double is at most the distance.
+    """
+    exact = str(value)
+    if len(exact) <= _MOST_DIGITS:
+        return Measure(f"{name}, in ranges", float(value), exact)
+    return Measure(f"{name}, in ranges", outwards(value)[0])
 
 
 # --- all rows
+
+
+class _RowRadius(NamedTuple):
+    low: Fraction
+    number: int
+    answer: AuditAnswer
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
@@ -182,12 +195,12 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
         needed = Declined("FTD06", "rows are needed (--data TABLE)")
         yield audit_answer("FT204.not-sought", "rows", declined or needed)
         return
-    points = points_of(subject, subject.rows)
+    points = row_points(subject, subject.rows)
     decider = RowDecider(subject)
     budget = subject.budget.share(_PART)
     radii: list[_RowRadius] = []
     most = MOST_ROWS if subject.tree is None else MOST_ROWS_OF_TREE
-    chosen = points.at[:most]
+    chosen = [*points.items()][:most]
     for number, point in chosen:
         if budget.is_spent:
             break
@@ -196,43 +209,136 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
         is_worth_keeping = result.is_narrow or (not radii and result.high is not None)
         if budget.is_spent and not is_worth_keeping:
             break
-        answer = _answer(decider, f"row {number}", point, result)
-        radii.append(_RowRadius(number, result.low, answer))
-    radii.sort(key=lambda one: (one.low, one.number))
-    yield _in_all(points, radii)
-    yield from (one.answer for one in radii[:SHOWN_ROWS])
+        answer = _radius(decider, f"row {number}", point, result)
+        radii.append(_RowRadius(result.low, number, answer))
+    radii.sort(key=lambda row: row[:2])
+    yield _summary(subject.rows, points, radii)
+    yield from (row.answer for row in radii[:SHOWN_ROWS])
     if 0 < len(radii) < len(chosen):
-        yield rows_left_out("FT204", len(chosen) - len(radii))
+        spent = Declined("FTD03", "the budget was spent")
+        rest = {"count": len(chosen) - len(radii)}
+        yield audit_answer("FT204.more-rows", "more rows", spent, facts=rest)
 
 
-class _RowRadius(NamedTuple):
-    number: int
-    low: Fraction
-    answer: AuditAnswer
+def row_points(subject: Subject, rows: AuditRows) -> dict[int, dict[str, Fraction]]:
+    """Return the user's rows in the domain as points, by number, close calls first.
+
+    Equal rows stand once. A call is close where the margin of the rules is small: there
+    another decision tends to be near.
+    """
+    names, variables = subject.rules.inputs, subject.rules.variables
+    margins = decide(subject.rules, rows.values, with_strengths=False).margin
+    numbers: dict[tuple[float, ...], int] = {}
+    for row in np.argsort(margins, kind="stable").tolist():
+        numbers.setdefault(tuple(rows.values[:, row].tolist()), row + 1)
+    points = {
+        number: dict(zip(names, map(Fraction, values), strict=True))
+        for values, number in numbers.items()
+        if all(map(math.isfinite, values))
+    }
+    return {
+        number: point
+        for number, point in points.items()
+        if contains(subject.domain, variables, point)
+    }
 
 
-def _in_all(points: DomainRows, radii: Sequence[_RowRadius]) -> AuditAnswer:
+def _summary(
+    rows: AuditRows, points: Mapping[int, object], radii: Sequence[_RowRadius]
+) -> AuditAnswer:
     """Return an answer about all rows together; `radii` is in order of their radius."""
     count = Measure("rows evaluated", len(radii))
     if not radii:
-        state = (
-            Declined("FTD03", "the budget was spent before the first row")
-            if points.at
-            else Declined("FTD06", "no row lies in the domain")
-        )
-        return audit_answer("FT204.not-sought", "rows", state, measures=(count,))
-    first = radii[0]
-    least = first.low
-    facts = points.facts
-    if len(radii) < len(points.at):
-        facts["different"] = len(points.at)
-    median = statistics.median_low([one.low for one in radii])
-    measures = (
-        count,
-        distance_measure("smallest certified radius", least),
-        distance_measure("median certified radius", median),
-        Measure("row", first.number),
-    )
+        state = Declined("FTD06", "no row lies in the domain")
+        if points:
+            state = Declined("FTD03", "the budget was spent before the first row")
+        return audit_answer("FT204.not-sought", "rows", state, count)
+    facts: dict[str, FactValue] = {"total": rows.values.shape[1]}
+    different = len({tuple(row) for row in rows.values.T.tolist()})
+    if len(points) < different:
+        facts["incomplete"] = different - len(points)
+    if len(radii) < len(points):
+        facts["different"] = len(points)
+    median = statistics.median_low([row.low for row in radii])
     return audit_answer(
-        "FT204.rows", "rows", first.answer.state, measures=measures, facts=facts
+        "FT204.rows",
+        "rows",
+        radii[0].answer.state,
+        count,
+        distance_measure("smallest certified radius", radii[0].low),
+        distance_measure("median certified radius", median),
+        Measure("row", radii[0].number),
+        facts=facts,
     )
+
+
+# --- gaps
+
+
+def rank_by_distance(
+    gaps: Sequence[AuditAnswer],
+    rows: AuditRows,
+    domain: Domain,
+    variables: Sequence[Variable],
+) -> tuple[AuditAnswer, ...]:
+    """Return gaps in order of how near they are to a row, with the distance.
+
+    A gap far from all that was ever seen matters less than one among the rows. It is
+    measured from its region, or else from the point of its witness.
+    """
+    inputs = [variable.name for variable in variables if not variable.parts]
+    sums = {variable.name: variable for variable in variables if variable.parts}
+    boxes = [_box(gap, domain, sums) for gap in gaps]
+    parts = Polytopes(
+        inputs, [polytope_of(box, inputs, sums.values()) for box in boxes]
+    )
+    costs = Costs(domain, inputs)
+    fixed = {side.variable: side.low for side in domain.sides if side.low == side.high}
+    points = {
+        number: {
+            name: Fraction(fixed.get(name, value))
+            for name, value in zip(inputs, values, strict=True)
+        }
+        for number, values in enumerate(rows.values.T.tolist(), 1)
+        if all(map(math.isfinite, values))
+    }
+    if not points:
+        return (*gaps,)
+    bounds = {number: parts.bounds(point, costs) for number, point in points.items()}
+    ranked: list[tuple[Fraction, AuditAnswer]] = []
+    for place, gap in enumerate(gaps):
+        best: tuple[Fraction, int] | None = None
+        for bound, number in sorted(
+            (bounds[number][place], number) for number in points
+        ):
+            if best is not None and bound > best[0]:
+                break
+            low = parts.nearest(points[number], [place], costs).low
+            best = (low, number) if best is None or low < best[0] else best
+        assert best is not None  # there is a point
+        measures = (
+            distance_measure("distance to the nearest row", best[0]),
+            Measure("nearest row", best[1]),
+        )
+        ranked.append((best[0], replace(gap, measures=(*gap.measures, *measures))))
+    return tuple(gap for _, gap in sorted(ranked, key=lambda pair: pair[0]))
+
+
+def _box(gap: AuditAnswer, domain: Domain, sums: Mapping[str, Variable]) -> Domain:
+    """Return where a gap is: its region, else its point."""
+    spans = gap.region
+    if not spans and isinstance(gap.state, Witness):
+        point = point_of(gap.state.point)
+        spans = tuple(Span(name, *outwards(value)) for name, value in point.items())
+    sides = {side.variable: side for side in domain.sides}
+    for span in spans:
+        name = span.variable
+        if name not in sides:
+            low, high = ends_on(sums[name], domain)
+            sides[name] = DomainSide(name, outwards(low)[0], outwards(high)[1])
+        whole = sides[name]
+        least = whole.low if span.low is None else max(whole.low, span.low)
+        most = whole.high if span.high is None else min(whole.high, span.high)
+        values = tuple(x for x in whole.points if least <= x <= most)
+        sides[name] = DomainSide(name, least, most, values=values)
+    return Domain(tuple(sides.values()))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -15,11 +16,15 @@ from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.decide.pairs import Pairs
 from fuzzytree.auditing.decide.rules import BaseRule
 from fuzzytree.auditing.decide.states import Declined, Proved, State
+from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,
     AuditSettings,
+    FactValue,
+    Measure,
     Policy,
     SourceFile,
+    TermName,
 )
 from fuzzytree.model import (
     Document,
@@ -40,13 +45,11 @@ Name = tuple[str, str]
 
 
 class AuditRows(msgspec.Struct, frozen=True, eq=False):
-    """Rows of a table.
+    """Rows of a table, and what messages call it.
 
-    Attributes:
-        name: What messages call the table.
-        values: Shape (inputs, rows), in the order of the model's inputs.
-        codes: The number of each row's class, -1 if it has none of the model's; None
-            if the table has no column of classes.
+    `values` has the shape (inputs, rows), in the order of the model's inputs; `codes`
+    the number of each row's class, -1 if it has none of the model's; it is None if the
+    table has no column of classes.
     """
 
     name: str
@@ -57,12 +60,7 @@ class AuditRows(msgspec.Struct, frozen=True, eq=False):
 class Material(msgspec.Struct, frozen=True, eq=False):
     """What an audit is about, each file of it read once: it may change meanwhile.
 
-    Attributes:
-        model: The model.
-        file: Where it was read from; None if from memory.
-        rows: The user's rows.
-        data: The table that they come from, if it is a file.
-        results: What other verbs found of the model.
+    `data` is the file of the rows, `results` what other verbs found of the model.
     """
 
     model: Document
@@ -79,19 +77,14 @@ class AuditView(msgspec.Struct, frozen=True, eq=False):
         rules: The rules as people read them, without weights; None if not one rule of
             a system could be taken over.
         base_rules: The same rules as the decider takes them.
-        policy: How they decide.
-        domain: The domain: where inputs are moved into their range, not
-            beyond it.
-        tree: The tree they come from.
-        raw: Its raw rules, if it has fitted sets.
-        system: The system they come from.
-        rule_names: Such as `rule 2 of block 1` for each rule; empty where rules
-            are simply numbered.
+        domain: Where inputs are moved into their range, not beyond it.
+        tree, system: The model they come from, if it is one.
+        raw: The raw rules of a tree with fitted sets.
+        rule_names: Such as `rule 2 of block 1`; empty where rules are numbered.
         numbers: The number in the model of each rule, from 1, over all blocks.
         declined: What was left out, and why; and rules that can never fire.
         left_out: The number in the model of each rule that is named there.
-        is_whole: Whether no rule is left out that may fire. Otherwise where no rule of
-            the view fires another one may.
+        is_whole: Whether no rule is left out that may fire.
         curves: The functions of a system's terms that lines enclose.
         inexact: Those and all others that have no exact shape, hedged ones too; in
             `rules` a plateau stands for each.
@@ -118,14 +111,10 @@ class AuditView(msgspec.Struct, frozen=True, eq=False):
 
 
 class Subject(AuditView, frozen=True, eq=False, kw_only=True):
-    """A model as the families of questions receive it.
+    """A model with at least one rule, as the families of questions receive it.
 
-    Attributes:
-        rules: As in a view, at least one.
-        settings: The thresholds.
-        budget: How many steps are left.
-        pairs: What is asked of pairs of its rules, and of one.
-        rows: The user's rows.
+    `budget` says how many steps are left, `pairs` answers of its rules; `row` is one
+    whose nearest other decision is sought.
     """
 
     rules: RuleBase
@@ -133,6 +122,7 @@ class Subject(AuditView, frozen=True, eq=False, kw_only=True):
     budget: Budget
     pairs: Pairs
     rows: AuditRows | None = None
+    row: Mapping[str, float] | None = None
 
     @property
     def claims(self) -> Claims:
@@ -143,6 +133,23 @@ class Subject(AuditView, frozen=True, eq=False, kw_only=True):
     def base(self) -> Base:
         """The rules, ready for questions."""
         return self.pairs.base
+
+    def answer(
+        self,
+        message: str,
+        places: Sequence[int],
+        state: State,
+        *measures: Measure,
+        subject: str = "",
+        terms: tuple[TermName, ...] = (),
+        facts: Mapping[str, FactValue] = MappingProxyType({}),
+    ) -> AuditAnswer:
+        """Return an answer about rules at some positions; `subject` may name more."""
+        rules = tuple(place + 1 for place in places)
+        subject = subject or " and ".join(map(self.rule_name, rules))
+        return audit_answer(
+            message, subject, state, *measures, facts=facts, rules=rules, terms=terms
+        )
 
     def class_at(
         self, point: Mapping[str, Fraction], without: int | None = None
@@ -161,6 +168,7 @@ def subject_of(
     settings: AuditSettings,
     budget: Budget | None = None,
     rows: AuditRows | None = None,
+    row: Mapping[str, float] | None = None,
 ) -> Subject:
     """Return the rules of a view, ready for questions.
 
@@ -175,8 +183,14 @@ def subject_of(
     base = Base(viewed.base_rules, variables, viewed.domain, seed=settings.seed)
     budget = budget or Budget(int(settings.budget * 1e6))
     pairs = Pairs(Claims(base, viewed.policy.uncovered))
-    facts = msgspec.structs.asdict(viewed)
-    return Subject(**facts, settings=settings, budget=budget, pairs=pairs, rows=rows)
+    return Subject(
+        **msgspec.structs.asdict(viewed),
+        settings=settings,
+        budget=budget,
+        pairs=pairs,
+        rows=rows,
+        row=row,
+    )
 
 
 def state_of(answer: Answer) -> State:

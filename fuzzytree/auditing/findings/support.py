@@ -51,30 +51,18 @@ _MOST_DEGREES = 1 << 24  # of all propositions at points that are drawn
 _LEAST_ROWS = 1000  # that are drawn however many propositions there are
 
 
-def wilson(hits: int, rows: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Return Wilson's score interval of a share.
+def wilson(hits: int, rows: int) -> tuple[float, float]:
+    """Return Wilson's score interval of a share, of at least 1 row.
 
     With z the quantile of the normal distribution and p = hits / rows its ends are
     `(p + z^2 / 2n -+ z sqrt(p (1 - p) / n + z^2 / 4n^2)) / (1 + z^2 / n)`
     (E. B. Wilson, 1927).
 
-    Args:
-        hits: In how many rows it holds.
-        rows: How many rows there are, at least 1.
-        confidence: In (0, 1).
-
-    Raises:
-        ValueError: If there is no such share.
-
     Example:
         >>> [round(end, 4) for end in wilson(0, 20)]
         [0.0, 0.1611]
     """
-    if not 0 <= hits <= rows or not rows:
-        raise ValueError(f"no share: {hits} of {rows}")
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"the confidence must lie in (0, 1), not {confidence!r}")
-    z = NormalDist().inv_cdf((1.0 + confidence) / 2.0)
+    z = NormalDist().inv_cdf((1.0 + CONFIDENCE) / 2.0)
     p, bottom = hits / rows, 1.0 + z * z / rows
     middle = (p + z * z / (2.0 * rows)) / bottom
     root = math.sqrt(p * (1.0 - p) / rows + z * z / (4.0 * rows * rows))
@@ -83,35 +71,38 @@ def wilson(hits: int, rows: int, confidence: float = CONFIDENCE) -> tuple[float,
     return low, 1.0 if hits == rows else min(middle + half, 1.0)
 
 
-def sampled_share(
-    of: str, hits: int, rows: int, how: str, confidence: float = CONFIDENCE
-) -> Sampled:
-    """Return a share that was counted in a sample, with its interval.
-
-    Raises:
-        ValueError: As `wilson`.
-    """
-    return Sampled(of, hits, rows, *wilson(hits, rows, confidence), confidence, how)
+def sampled_share(of: str, hits: int, rows: int, how: str) -> Sampled:
+    """Return a share that was counted in a sample, with its interval."""
+    return Sampled(of, hits, rows, *wilson(hits, rows), CONFIDENCE, how)
 
 
 def sample_points(rules: RuleBase, domain: Domain, rows: int, seed: int) -> FloatArray:
-    """Return points drawn evenly from a domain.
+    """Return points drawn evenly from a domain, of shape (inputs, points).
 
-    Returns:
-        Shape (inputs, points); fewer points than `rows`, perhaps none, where the
-        domain limits combinations.
-
-    Raises:
-        ValueError: If an input has no side.
+    They are fewer than `rows`, perhaps none, where the domain limits combinations.
     """
     chance = np.random.default_rng(seed)
-    table = np.empty((len(rules.inputs), rows))
-    for position, name in enumerate(rules.inputs):
-        side = domain.side(name)
-        if side is None:
-            raise ValueError(f"input {name!r} has no side in the domain")
-        table[position] = drawn_values(side, chance.random(rows))
+    sides = {side.variable: side for side in domain.sides}
+    columns = [drawn_values(sides[name], chance.random(rows)) for name in rules.inputs]
+    table = np.array(columns).reshape(len(rules.inputs), rows)
     return table[:, ~rows_outside(rules, domain, table)]
+
+
+def drawn_values(side: DomainSide, shares: FloatArray) -> FloatArray:
+    """Return values of rows, spread evenly as shares from 0 to 1 are.
+
+    Example:
+        >>> from fuzzytree.auditing.decide.domain import DomainSide
+        >>> doors = DomainSide("doors", 1.0, 4.0, is_whole=True)
+        >>> drawn_values(doors, np.array([0.0, 0.3, 0.99])).tolist()
+        [1.0, 2.0, 4.0]
+    """
+    if side.values:
+        values = np.array(side.points)
+        return np.asarray(values[(shares * len(values)).astype(np.int64)])
+    if side.is_whole:
+        return side.low + np.floor(shares * (side.high - side.low + 1.0))
+    return np.clip(side.low * (1.0 - shares) + side.high * shares, side.low, side.high)
 
 
 def rows_outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArray:
@@ -143,28 +134,25 @@ class RuleCounts(msgspec.Struct, frozen=True, eq=False):
     """What the rules say about some rows.
 
     Attributes:
-        rows: How many rows there are.
-        missing: In how many a value is missing; nothing else is counted of them.
-        fired: On how many rows each rule fires.
-        won: How many it wins: it is the first of the strongest.
-        right: How many of those have its class; None if no classes are known.
-        uncovered: Rows on which no rule fires.
-        weak: Rows on which no rule is as strong as epsilon, uncovered ones too.
-        tied: Covered rows whose strongest classes are equally strong.
-        close: Covered rows whose strongest classes differ by at most the margin.
+        missing: In how many rows a value is missing; nothing else is counted of them.
+        fired, won, right: On how many rows each rule fires; how many it wins, as the
+            first of the strongest; how many of those have its class.
+        uncovered, weak: Rows on which no rule fires, or none is as strong as epsilon.
+        tied, close: Covered rows whose strongest classes are equally strong, or differ
+            by at most the margin.
         outside: Rows with a value outside the domain.
     """
 
     rows: int
     missing: int
+    outside: int
     fired: IntArray
-    won: IntArray
-    right: IntArray | None
     uncovered: int
     weak: int
-    tied: int
-    close: int
-    outside: int
+    tied: int = 0
+    close: int = 0
+    won: IntArray | None = None
+    right: IntArray | None = None
 
     @property
     def known(self) -> int:
@@ -175,7 +163,7 @@ class RuleCounts(msgspec.Struct, frozen=True, eq=False):
 def count_rows(
     subject: Subject, values: FloatArray, codes: IntArray | None = None
 ) -> RuleCounts:
-    """Count what the rules say about some rows of shape (inputs, rows)."""
+    """Count what rules say of which the strongest decides, of (inputs, rows)."""
     rules, settings = subject.rules, subject.settings
     totals = dict.fromkeys(("missing", "uncovered", "weak", "tied", "close"), 0)
     count = len(rules.rules)
@@ -185,7 +173,7 @@ def count_rows(
         subject.budget.check()
         part = values[:, start : start + _STEP]
         decisions = decide(rules, part)
-        fires, is_weak, margin = _settled(subject, part, decisions)
+        fires, is_weak, margin = _exact_parts(subject, part, decisions)
         is_known = decisions.status != MISSING
         is_covered = is_known & (decisions.status != UNCOVERED)
         fired += (fires & is_known).sum(axis=1)
@@ -195,22 +183,25 @@ def count_rows(
             own = decisions.rule[is_won] - 1
             is_right = codes[start : start + _STEP][is_won] == owner[own]
             right += np.bincount(own[is_right], minlength=count)
-        totals["missing"] += int((~is_known).sum())
-        totals["uncovered"] += int((decisions.status == UNCOVERED).sum())
-        totals["weak"] += int((is_known & is_weak).sum())
-        totals["tied"] += int((is_covered & (margin == 0.0)).sum())
-        totals["close"] += int((is_covered & (margin <= settings.margin)).sum())
+        for name, hits in (
+            ("missing", ~is_known),
+            ("uncovered", decisions.status == UNCOVERED),
+            ("weak", is_known & is_weak),
+            ("tied", is_covered & (margin == 0.0)),
+            ("close", is_covered & (margin <= settings.margin)),
+        ):
+            totals[name] += int(hits.sum())
     return RuleCounts(
         rows=values.shape[1],
+        outside=int(rows_outside(rules, subject.domain, values).sum()),
         fired=fired,
         won=won,
         right=None if codes is None else right,
-        outside=int(rows_outside(rules, subject.domain, values).sum()),
         **totals,
     )
 
 
-def _settled(
+def _exact_parts(
     subject: Subject, values: FloatArray, decisions: Decisions
 ) -> tuple[BoolArray, BoolArray, FloatArray]:
     """Settle by fractions what the doubts of some answers leave open.
@@ -247,23 +238,67 @@ def _firing(rules: RuleBase, values: FloatArray) -> tuple[BoolArray, BoolArray]:
     """Return which rules are above 0 for sure, and which may be."""
     named = dict(zip(rules.inputs, values, strict=True))
     shapes = shapes_of(rules.variables)
-    known: dict[Proposition, Enclosure] = {}
+    bounds: dict[Proposition, Enclosure] = {}
     fires: BoolArray = np.ones((len(rules.rules), values.shape[1]), np.bool_)
     may_fire = fires.copy()
     with np.errstate(all="ignore"):
         axes = {v.name: axis_value(v, named) for v in rules.variables}
         for position, rule in enumerate(rules.rules):
             for proposition in rule.when:
-                if proposition not in known:
-                    x = axes[proposition.variable]
-                    degrees = [
-                        degree_enclosure(shapes[proposition.variable, term], x)
-                        for term in proposition.terms
-                    ]
-                    known[proposition] = proposition_enclosure(proposition, degrees)
-                fires[position] &= known[proposition].low > 0.0
-                may_fire[position] &= known[proposition].high > 0.0
+                if proposition not in bounds:
+                    name = proposition.variable
+                    curves = [shapes[name, term] for term in proposition.terms]
+                    degrees = [degree_enclosure(curve, axes[name]) for curve in curves]
+                    bounds[proposition] = proposition_enclosure(proposition, degrees)
+                fires[position] &= bounds[proposition].low > 0.0
+                may_fire[position] &= bounds[proposition].high > 0.0
     return fires, may_fire
+
+
+def _system_counts(
+    subject: Subject, values: FloatArray, *, is_each: bool
+) -> tuple[RuleCounts, RuleCounts]:
+    """Count on which rows conditions of a system hold, at least and at most.
+
+    Where doubles leave it open, or lines around curves end, a row is evaluated exactly.
+    """
+    base, level = subject.base.fine, subject.settings.epsilon
+    outside = rows_outside(subject.rules, subject.domain, values)
+    known = ~np.isnan(values).any(axis=0)
+    columns = dict(zip(subject.rules.inputs, values, strict=True))
+    sides = [base.in_doubles(columns, is_upper=is_upper) for is_upper in (False, True)]
+    is_open = outside & np.isfinite(values).all(axis=0)
+    low, high = (side if is_each else side.max(axis=0)[None] for side in sides)
+    is_near = (low <= 0.0) & (high > 0.0)
+    is_near |= (low <= level + _NEAR) & (high >= level - _NEAR)
+    is_open |= known & is_near.any(axis=0)
+    for row in np.flatnonzero(is_open).tolist():
+        subject.budget.check()
+        point = {name: Fraction(float(x[row])) for name, x in columns.items()}
+        for side, exact in zip(sides, base.strengths(point), strict=True):
+            side[:, row] = [_on_side(strength, level) for strength in exact]
+    least, most = (
+        RuleCounts(
+            rows=values.shape[1],
+            missing=int((~known).sum()),
+            outside=int(outside.sum()),
+            fired=((side > 0.0) & known).sum(axis=1),
+            uncovered=int((known & (side.max(axis=0) <= 0.0)).sum()),
+            weak=int((known & (side.max(axis=0) < level)).sum()),
+        )
+        for side in sides
+    )
+    return least, most
+
+
+def _on_side(strength: Fraction, limit: float) -> float:
+    """Return a strength as a double, on its side of a limit."""
+    near = float(strength)
+    is_below = strength < Fraction(limit) <= near
+    return math.nextafter(near, -math.inf) if is_below else near
+
+
+# --- answers
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
@@ -279,7 +314,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
 def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
     """Yield what the user's rows say, of all rules together and of each."""
     codes = None if subject.system else rows.codes  # a view has classes of its own
-    lower, most = _both(subject, rows.values, codes, is_each=True)
+    lower, most = _counts(subject, rows.values, codes, is_each=True)
     how = f"every row of {rows.name}"
     total = lower.rows
     for message, name, hits in (
@@ -298,11 +333,9 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
         if fired == least:
             yield _of_rule(subject, lower, number, how)
             continue
-        name = subject.rule_name(number)
-        reason = (
-            f"it fires on {least} of {lower.known} at least, and on {fired} at most"
-        )
-        yield audit_answer("FT701.rule-open", name, Declined("FTD02", reason))
+        why = f"it fires on {least} of {lower.known} at least, and on {fired} at most"
+        declined, name = Declined("FTD02", why), subject.rule_name(number)
+        yield audit_answer("FT701.rule-open", name, declined)
 
 
 def _of_domain(subject: Subject) -> Iterator[AuditAnswer]:
@@ -315,13 +348,13 @@ def _of_domain(subject: Subject) -> Iterator[AuditAnswer]:
         reason = "no drawn point lies within the sides of the combinations"
         yield audit_answer("FT701.no-points", "domain", Declined("FTD04", reason))
         return
-    lower, most = _both(subject, points)
+    lower, most = _counts(subject, points)
     how = f"points drawn evenly from the domain, seed {settings.seed}"
     if lower.known:  # a combination may overflow everywhere
         yield from _shares(subject, (lower, most), "points", how)
 
 
-def _both(
+def _counts(
     subject: Subject,
     values: FloatArray,
     codes: IntArray | None = None,
@@ -329,60 +362,10 @@ def _both(
     is_each: bool = False,
 ) -> tuple[RuleCounts, RuleCounts]:
     """Count what the rules say from below, and from above; perhaps each of them."""
-    if subject.policy.decision == "strongest":
-        counts = count_rows(subject, values, codes)
-        return counts, counts
-    return _fired(subject, values, is_each=is_each)
-
-
-def _fired(
-    subject: Subject, values: FloatArray, *, is_each: bool
-) -> tuple[RuleCounts, RuleCounts]:
-    """Count on which rows conditions of a system hold, at least and at most.
-
-    Where doubles leave it open, or lines around curves end, a row is evaluated exactly.
-    """
-    base, epsilon = subject.base.fine, Fraction(subject.settings.epsilon)
-    outside = rows_outside(subject.rules, subject.domain, values)
-    known = ~np.isnan(values).any(axis=0)
-    columns = dict(zip(subject.rules.inputs, values, strict=True))
-    sides = [base.in_doubles(columns, is_upper=is_upper) for is_upper in (False, True)]
-    is_open = outside & np.isfinite(values).all(axis=0)
-    looks = [side if is_each else side.max(axis=0, keepdims=True) for side in sides]
-    for limit in (0.0, subject.settings.epsilon):
-        is_near = (looks[0] <= limit) & (looks[1] > limit)
-        if limit:
-            is_near |= (looks[0] <= limit + _NEAR) & (looks[1] >= limit - _NEAR)
-        is_open |= known & is_near.any(axis=0)
-    for row in np.flatnonzero(is_open).tolist():
-        subject.budget.check()
-        point = {name: Fraction(float(x[row])) for name, x in columns.items()}
-        for side, exact in zip(sides, base.strengths(point), strict=True):
-            side[:, row] = [_rounded(strength, epsilon) for strength in exact]
-    results = []
-    for side in sides:
-        best = side.max(axis=0)
-        results.append(
-            RuleCounts(
-                rows=values.shape[1],
-                missing=int((~known).sum()),
-                fired=((side > 0.0) & known).sum(axis=1),
-                won=np.zeros(base.count, np.int64),
-                right=None,
-                uncovered=int((known & (best <= 0.0)).sum()),
-                weak=int((known & (best < subject.settings.epsilon)).sum()),
-                tied=0,
-                close=0,
-                outside=int(outside.sum()),
-            )
-        )
-    return results[0], results[1]
-
-
-def _rounded(strength: Fraction, limit: Fraction) -> float:
-    """Return a strength as a double, on its side of a limit."""
-    near = float(strength)
-    return math.nextafter(near, -math.inf) if strength < limit <= near else near
+    if subject.policy.decision == "all":
+        return _system_counts(subject, values, is_each=is_each)
+    counts = count_rows(subject, values, codes)
+    return counts, counts
 
 
 def _shares(
@@ -424,13 +407,13 @@ def _of_rule(
 ) -> AuditAnswer:
     """Return on how many rows a rule fires, how many it wins, and how many rightly."""
     name, total = subject.rule_name(number), counts.known
-    fired, won = int(counts.fired[number - 1]), int(counts.won[number - 1])
-    label = subject.rules.rules[number - 1].then
+    fired = int(counts.fired[number - 1])
     facts: dict[str, FactValue] = {"known": total}
     measures = [Measure("rows fired", fired)]
     state = sampled_share(f"rows on which {name} fires", fired, total, how)
     is_finding = not fired
-    if subject.policy.decision == "strongest":
+    if counts.won is not None:
+        won = int(counts.won[number - 1])
         is_finding = not won
         measures.append(Measure("rows won", won))
         state = sampled_share(f"rows that {name} wins", won, total, how)
@@ -439,34 +422,13 @@ def _of_rule(
             measures.append(Measure("rows won rightly", right))
             of = f"rows that {name} wins and that have its class"
             state = sampled_share(of, right, won, f"of {how}, those that it wins")
-            facts["then"] = label
+            facts["then"] = subject.rules.rules[number - 1].then
     return audit_answer(
         "FT701.rule",
         name,
         state,
+        *measures,
+        facts=facts,
         is_finding=is_finding,
         rules=(number,),
-        measures=tuple(measures),
-        facts=facts,
     )
-
-
-def drawn_values(side: DomainSide, shares: FloatArray) -> FloatArray:
-    """Return values of rows, spread evenly as shares from 0 to 1 are.
-
-    Example:
-        >>> from fuzzytree.auditing.decide.domain import DomainSide
-        >>> doors = DomainSide("doors", 1.0, 4.0, is_whole=True)
-        >>> drawn_values(doors, np.array([0.0, 0.3, 0.99])).tolist()
-        [1.0, 2.0, 4.0]
-    """
-    if side.values:
-        values = np.array(side.points)
-        result: FloatArray = values[(shares * len(values)).astype(np.int64)]
-        return result
-    if side.is_whole:
-        result = side.low + np.floor(shares * (side.high - side.low + 1.0))
-        return result
-    result = side.low * (1.0 - shares) + side.high * shares
-    result = np.clip(result, side.low, side.high)
-    return result

@@ -1,7 +1,4 @@
-"""Questions about terms: are they reached, used, well shaped, and distinguished?
-
-The ranges of variables serve other questions too.
-"""
+"""Questions about terms: whether they are reached, used and distinguished; how many."""
 
 from __future__ import annotations
 
@@ -13,13 +10,21 @@ from typing import Final, NamedTuple
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.decide import measures, states
+from fuzzytree.auditing.decide import measures
 from fuzzytree.auditing.decide.answers import ONE, ZERO
 from fuzzytree.auditing.decide.axes import function_lines
 from fuzzytree.auditing.decide.domain import span
 from fuzzytree.auditing.decide.lines import Between, Lines, combined, constant, lines_of
 from fuzzytree.auditing.decide.measures import Bounds
-from fuzzytree.auditing.decide.states import Bracket, Computed, Proved, State, counted
+from fuzzytree.auditing.decide.states import (
+    Bracket,
+    Computed,
+    Declined,
+    Proved,
+    Span,
+    State,
+    counted,
+)
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject
@@ -31,6 +36,7 @@ from fuzzytree.model import (
     Shape,
     Term,
     Variable,
+    depth,
     questions,
 )
 from fuzzytree.numerics import exact_degree, outwards
@@ -43,10 +49,8 @@ _INEXACT: Final = "curves are known between functions of lines"
 class VariableRange(NamedTuple):
     """A variable with its terms and its values on the domain.
 
-    Attributes:
-        curves: The functions of the terms that have no exact shape.
-        is_open: Whether the least value is left out.
-        values: Those of rows, one by one; empty of numbers.
+    `curves` are the functions of terms without an exact shape; `values` those of rows,
+    one by one, and empty of numbers. Where it `is_open` the least value is left out.
     """
 
     variable: Variable
@@ -102,10 +106,6 @@ def ranges(subject: Subject) -> tuple[VariableRange, ...]:
     return tuple(result)
 
 
-def _terms(variables: Sequence[Variable]) -> list[tuple[str, str]]:
-    return [(one.name, term.name) for one in variables for term in one.terms]
-
-
 def measure(name: str, value: Bounds) -> Measure:
     """Return a number between bounds as a measure: their middle."""
     exact = str(value.low) if value.low == value.high else None
@@ -137,21 +137,22 @@ def _heights(subject: Subject) -> Iterator[AuditAnswer]:
             elif high and (curve is not None or high >= level or high - low > _NEAR):
                 message = "FT401.low-curve" if high < level else "FT401.open"
                 what = f"the largest degree of {_title(of, [term])}"
-                state = Bracket(what, outwards(low)[0], outwards(high)[1], _INEXACT)
-                ends = {"height at least": state.low, "height at most": state.high}
-                numbers = itertools.starmap(Measure, ends.items())
-                yield _about(message, of, [term], state, {}, *numbers)
+                ends = outwards(low)[0], outwards(high)[1]
+                least = Measure("height at least", ends[0])
+                most = Measure("height at most", ends[1])
+                state: State = Bracket(what, *ends, _INEXACT)
+                yield _about(message, of, [term], state, least, most)
             else:
                 message = "FT401.low" if high else "FT401.empty"
-                how = Proved("its degree was evaluated wherever it may be largest")
+                state = Proved("its degree was evaluated wherever it may be largest")
                 place = {"at": float(of.values[int(at)] if of.values else at)}
                 height = measure("height", Bounds(low, high))
-                yield _about(message, of, [term], how, place, height)
+                yield _about(message, of, [term], state, height, facts=place)
     if clean:
         proof = Proved(f"the height of {clean} terms was found")
-        least = (measure("lowest height", Bounds(lowest, lowest)),)
+        least = measure("lowest height", Bounds(lowest, lowest))
         facts = {"count": clean, "level": float(level)}
-        yield audit_answer("FT401.reached", "terms", proof, measures=least, facts=facts)
+        yield audit_answer("FT401.reached", "terms", proof, least, facts=facts)
 
 
 def _title(of: VariableRange, terms: Sequence[Term]) -> str:
@@ -166,8 +167,8 @@ def _about(
     of: VariableRange,
     terms: Sequence[Term],
     state: State,
-    facts: Mapping[str, str | float],
     *numbers: Measure,
+    facts: Mapping[str, str | float] = MappingProxyType({}),
     ends: tuple[Fraction, Fraction] | None = None,
 ) -> AuditAnswer:
     """Return an answer about terms on their range, or from one end to another."""
@@ -177,10 +178,10 @@ def _about(
         message,
         _title(of, terms),
         state,
+        *numbers,
         terms=tuple(TermName(name, term.name) for term in terms),
-        measures=numbers,
         facts={"low": low, "high": high, **facts},
-        region=(states.Span(name, low, high),) if ends else (),
+        region=(Span(name, low, high),) if ends else (),
     )
 
 
@@ -192,30 +193,34 @@ def _unused(subject: Subject) -> Iterator[AuditAnswer]:
     propositions = [*used_terms(subject.rules)]
     if system is not None and subject.policy.decision == "all":
         variables = system.variables  # the view may lack rules and terms
-        rules = (rule for block in system.blocks for rule in block.rules)
-        asked = (one for rule in rules for one in questions(rule.when))
-        propositions = [(one.variable, one.term or "") for one in asked]
-    terms, used = _terms(variables), set(propositions)
-    needed = {variable for variable, _ in used}
+        every = (one for rule in system.rules for one in questions(rule.when))
+        propositions = [(one.variable, one.term or "") for one in every]
+    used, needed = set(propositions), {variable for variable, _ in propositions}
     for variable in subject.rules.variables:
         if variable.name in needed:
             needed.update(part.input for part in variable.parts)
-    idle = [
-        (f"variable {one.name!r}", _terms([one]))
-        for one in variables
-        if one.name not in needed
-    ]
-    rest = [pair for pair in terms if pair[0] in needed and pair not in used]
-    idle += [(f"term {pair[1]!r} of {pair[0]!r}", [pair]) for pair in rest]
     proof = Proved(f"{counted(len(propositions), 'proposition')} of all rules read")
-    for title, pairs in idle:
-        own = tuple(TermName(*pair) for pair in pairs)
-        yield audit_answer("FT404.unused", title, proof, terms=own)
-    counts = (
+    idle: dict[str, list[TermName]] = {}
+    for variable in variables:
+        name = variable.name
+        terms = [TermName(name, term.name) for term in variable.terms]
+        if name not in needed:
+            idle[f"variable {name!r}"] = terms
+    for variable in variables:
+        for term in variable.terms if variable.name in needed else ():
+            if (variable.name, term.name) not in used:
+                title = f"term {term.name!r} of {variable.name!r}"
+                idle[title] = [TermName(variable.name, term.name)]
+    for title, terms in idle.items():
+        yield audit_answer("FT404.unused", title, proof, terms=tuple(terms))
+    names = [(one.name, term.name) for one in variables for term in one.terms]
+    yield audit_answer(
+        "FT404.used",
+        "terms and variables",
+        proof,
         Measure("variables in use", sum(one.name in needed for one in variables)),
-        Measure("terms in use", sum(pair in used for pair in terms)),
+        Measure("terms in use", sum(name in used for name in names)),
     )
-    yield audit_answer("FT404.used", "terms and variables", proof, measures=counts)
 
 
 def used_terms(rules: RuleBase) -> Iterator[tuple[str, str]]:
@@ -249,9 +254,9 @@ def shape_answers(subject: Subject) -> Iterator[AuditAnswer]:
     if sound or shallow:
         how = "values and polynomials were evaluated in fractions, along all lines"
         state = Computed(how) if is_curved else Proved(how)
-        small = (Measure("smaller excesses and dips", shallow),)
+        small = Measure("smaller excesses and dips", shallow)
         facts = {"count": sound}
-        yield audit_answer("FT402.sound", "terms", state, measures=small, facts=facts)
+        yield audit_answer("FT402.sound", "terms", state, small, facts=facts)
 
 
 def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
@@ -266,11 +271,11 @@ def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
         most = Fraction(max(shape.degrees))
         how = Proved("the largest degree of its points")
         largest = measure("largest degree", Bounds(most, most))
-        yield _about("FT402.subnormal", of, [term], how, {}, largest)
+        yield _about("FT402.subnormal", of, [term], how, largest)
     if share is not None and 0 < share.high < Fraction(1, 2):
         how = Proved("its area was integrated in fractions, on the domain and in all")
         inside = measure("share of its area on the domain", share)
-        yield _about("FT402.outside", of, [term], how, {}, inside)
+        yield _about("FT402.outside", of, [term], how, inside)
 
 
 def _excesses(of: VariableRange, term: Term, shape: LR) -> Iterator[AuditAnswer | None]:
@@ -303,7 +308,7 @@ def _excesses(of: VariableRange, term: Term, shape: LR) -> Iterator[AuditAnswer 
                     Measure("excess", float(most - 1)),
                     Measure("place of the excess", float(-at), unit=of.variable.unit),
                 )
-                answer = _about(message, of, [term], how, {}, *numbers, ends=ends)
+                answer = _about(message, of, [term], how, *numbers, ends=ends)
                 yield answer if most - 1 >= SHALLOW else None
 
 
@@ -331,7 +336,7 @@ def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
         Measure("place of the deepest dip", float(valley), unit=of.variable.unit),
     )
     facts, ends = {"bottom": float(bottom)}, (left, right)
-    yield _about("FT402.peaks", of, [term], how, facts, *numbers, ends=ends)
+    yield _about("FT402.peaks", of, [term], how, *numbers, facts=facts, ends=ends)
 
 
 def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
@@ -374,8 +379,8 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
             pair = terms[a], terms[b]
             if sum(len(term.shape.knots()) for term in pair) > _MOST_KNOTS:
                 why = f"their curves have more than {_MOST_KNOTS} pieces"
-                state = states.Declined("FTD05", why)
-                yield _about("FT403.declined", of, pair, state, {})
+                state = Declined("FTD05", why)
+                yield _about("FT403.declined", of, pair, state)
                 continue
             shared = measures.overlap(curves[a], curves[b])
             if shared is None:
@@ -397,11 +402,9 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
             Proved(
                 "areas were bounded on cells, and integrated in fractions where near"
             ),
-            measures=(
-                Measure("pairs apart", apart),
-                Measure("pairs not listed", more),
-                Measure("pairs without area", points),
-            ),
+            Measure("pairs apart", apart),
+            Measure("pairs not listed", more),
+            Measure("pairs without area", points),
             facts=facts,
         )
 
@@ -431,4 +434,97 @@ def _overlapping(
         degree, at = shared.crossing
         numbers.append(measure("crossing height", Bounds(degree, degree)))
         numbers.append(Measure("crossing", float(at), unit=of.variable.unit))
-    return _about(message, of, pair, state, facts, *numbers)
+    return _about(message, of, pair, state, *numbers, facts=facts)
+
+
+# --- FT501: how large is the rule base?
+
+
+def size_answers(subject: Subject) -> Iterator[AuditAnswer]:
+    """Count rules, propositions and terms, and compute the index of Nauck."""
+    lengths = [len(rule.when) for rule in subject.rules.rules]
+    used = set(used_terms(subject.rules))
+    numbers = [
+        Measure("rules", len(lengths)),
+        Measure("propositions", sum(lengths)),
+        Measure("most propositions of a rule", max(lengths)),
+        Measure("propositions per rule", sum(lengths) / len(lengths)),
+        Measure("distinct terms in use", len(used)),
+        Measure("variables in use", len({variable for variable, _ in used})),
+    ]
+    if subject.tree is not None:
+        numbers.append(Measure("depth of the tree", depth(subject.tree)))
+    numbers += [measure(f"{name} of Nauck", value) for name, value in nauck(subject)]
+    # Of a view ways count, and rules left out do not.
+    is_view = subject.system is not None and subject.policy.decision == "all"
+    message = "FT501.size-of-view" if is_view else "FT501.size"
+    how = Computed("counted, and integrated in fractions")
+    yield audit_answer(message, "the rule base", how, *numbers)
+
+
+def nauck(subject: Subject) -> list[tuple[str, Bounds]]:
+    """Return the three factors of the index of Nauck on the domain, and their product.
+
+    D. D. Nauck, "Measuring interpretability in rule-based classification systems",
+    FUZZ-IEEE 2003, pages 196 to 201. With m classes, n_k variables in rule k, and p_i
+    terms of variable i, of those that rules use:
+
+    - complexity: m / (n_1 + n_2 + ...);
+    - coverage: the mean over the variables of the mean over the range of h_i(x), where
+      h is the sum s of the degrees of all p_i terms if s <= 1, and otherwise
+      (p_i - s) / (p_i - 1);
+    - partition: the mean over the variables of 1 / (p_i - 1), and 1 for one term.
+
+    Integrals are taken exactly, not on a grid. Nothing is returned if no rule uses a
+    variable, a range is a point, or a term has no exact shape.
+    """
+    terms = set(used_terms(subject.rules))
+    names = {variable for variable, _ in terms}
+    used = [of for of in ranges(subject) if of.variable.name in names]
+    is_known = terms.isdisjoint(subject.inexact)
+    if not used or not is_known or any(of.low == of.high for of in used):
+        return []
+    lengths = [len({c.variable for c in rule.when}) for rule in subject.rules.rules]
+    size = Fraction(len(subject.rules.classes), sum(lengths))
+    each = [coverage(of) for of in used]
+    low, high = (sum(ends, ZERO) / len(used) for ends in zip(*each, strict=True))
+    shares = (Fraction(1, max(len(of.terms) - 1, 1)) for of in used)
+    partition = sum(shares, ZERO) / len(used)
+    return [
+        ("complexity", Bounds(size, size)),
+        ("coverage", Bounds(low, high)),
+        ("partition", Bounds(partition, partition)),
+        ("index", Bounds(size * low * partition, size * high * partition)),
+    ]
+
+
+def coverage(of: VariableRange) -> Bounds:
+    """Return the mean of h(x) over a range, as `nauck` defines it.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Points, Term, Variable
+        >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
+        >>> both = Variable("x", (Term("low", down), Term("high", up)))
+        >>> coverage(VariableRange(both, ZERO, ONE)).low
+        Fraction(1, 1)
+    """
+    curves = [of.lines(term.shape) for term in of.terms]
+    low, high = curves[0].lower.x[0], curves[0].lower.x[-1]
+    level, totals = constant(ONE, low, high), list[Fraction]()
+    for side in (0, 1):
+        lines = combined(
+            [curve[side] for curve in curves], lambda both: both[0] + both[1]
+        )
+        below = measures.integral(combined([lines, level], min))
+        above = measures.integral(lines) - below  # of two terms or more
+        totals.append(below - above / max(len(curves) - 1, 1))
+    # Where degrees are enclosed, h differs by no more than their sum does.
+    slack = (
+        sum(
+            (measures.integral(c.upper) - measures.integral(c.lower) for c in curves),
+            ZERO,
+        )
+        / 2
+    )
+    total, width = sum(totals, ZERO) / 2, high - low
+    return Bounds(max(total - slack, ZERO) / width, min((total + slack) / width, ONE))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from fuzzytree.auditing.decide.regions import Region
 from fuzzytree.auditing.decide.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings import leaves
-from fuzzytree.auditing.findings.leaves import answers, too_many_boxes, values_text
+from fuzzytree.auditing.findings.leaves import answers, too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.numerics.exact import exact_answer
@@ -104,12 +103,11 @@ def test_rules_without_a_tree_have_no_leaves() -> None:
     assert [*answers(subject_of(subject_of(one_cut()).rules))] == []
 
 
-def test_leaves_of_too_many_boxes_are_declined() -> None:
-    line = tuple((float(n), n + 0.5) for n in range(100))
-    region = Region(1, "a", tuple((name, line) for name in "xyz"))
-    declined = too_many_boxes([region])
+def test_leaves_of_too_many_boxes_are_declined(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(leaves, "MOST_BOXES", 1)
+    declined = too_many_boxes(two_cuts(0.75))
     assert isinstance(declined, Declined)
-    assert declined.reason == "the leaves are made of 1000000 boxes, more than 20000"
+    assert declined.reason == "the leaves are made of 3 boxes, more than 1"
 
 
 def test_many_regions_are_not_listed(
@@ -121,7 +119,3 @@ def test_many_regions_are_not_listed(
     assert results[0].state == Declined(
         "FTD05", "the leaves are made of 2 boxes, more than 1"
     )
-
-
-def test_values_are_shown_in_words() -> None:
-    assert values_text(((None, None),)) == "any value"

@@ -531,7 +531,7 @@ def test_a_proposition_that_a_rule_of_the_class_makes_irrelevant_is_proved() -> 
 def test_many_propositions_that_matter_are_reported_up_to_a_number_and_counted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("fuzzytree.auditing.findings.propositions.MOST_SHOWN", 2)
+    monkeypatch.setattr("fuzzytree.auditing.findings.pairs.MOST_PROPOSITIONS", 2)
     answers = answers_for(base(*CLEAN), "FT107")
     assert [isinstance(one.state, Witness) for one in answers] == [True, True, False]
     assert answers[2].sentence == "1 more proposition matters: it decides some input"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 
 import numpy as np
 import pytest
@@ -16,24 +18,23 @@ from fuzzytree.auditing.decide.states import (
     Witness,
     point_of,
 )
-from fuzzytree.auditing.findings import conventions
-from fuzzytree.auditing.findings.conventions import Convention, questions
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.representations import (
+    Result,
     agreement,
     agreement_answers,
     answers,
+    convention_answers,
+    witness,
 )
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.auditing.findings.support import sample_points
-from fuzzytree.checking.comparing import ModelRun
 from fuzzytree.exporters.onnx import Output, write_onnx
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import Points, RuleBase, Term
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
-from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 from tests.auditing.findings.test_support import RULES, subject_of
@@ -51,8 +52,9 @@ def shipped(model: Model) -> OnnxModel:
 
 def findings(subject: Subject, *others: Model | OnnxModel) -> list[AuditAnswer]:
     points = sample_points(subject.rules, subject.domain, 200, 0)
-    found = agreement(subject, points, *others)
-    return [one for one in agreement_answers(subject, found, points) if one.is_finding]
+    result = agreement(subject, points, *others)
+    every = agreement_answers(subject, result), convention_answers(subject, result)
+    return [one for one in itertools.chain(*every) if one.is_finding]
 
 
 def test_all_forms_of_a_tree_answer_alike_in_all_runtimes() -> None:
@@ -75,7 +77,7 @@ def test_a_damaged_graph_is_found_and_a_right_one_is_not() -> None:
     subject = subject_of(TREE)
     assert findings(subject, shipped(TREE)) == []
     found = findings(subject, shipped(OTHER))
-    assert {one.code for one in found} == {"FT601"}
+    assert {one.code for one in found} == {"FT601", "FT602"}
     by_rows = next(one for one in found if isinstance(one.state, Witness))
     assert by_rows.severity == "error"
     assert by_rows.sentence.startswith("file 1 disagrees with the model in ")
@@ -136,7 +138,7 @@ def test_what_was_not_compared_is_declined() -> None:
     other = "native float32: rules: term 'low' of 'force' is not wider than rounding"
     cells = "all cells one by one (1e+09 points): the proof covers them"
     skipped = Agreement("grip", "", (), skipped=(text, other, cells))
-    found = [*agreement_answers(subject_of(RULES), skipped, POINTS)]
+    found = [*agreement_answers(subject_of(RULES), Result(skipped, POINTS))]
     assert [(one.subject, one.state) for one in found] == [
         ("onnxruntime float64", Declined("FTD08", text)),
         ("native float32", Declined("FTD08", other)),
@@ -147,7 +149,7 @@ def test_what_was_not_compared_is_declined() -> None:
 def test_raw_rules_that_differ_from_their_tree_by_design_are_no_finding() -> None:
     one = Comparison("raw rules", "tree", "rows", 5, "differs by design", 3)
     found = Agreement("grip", "", (one,))
-    assert [*agreement_answers(subject_of(TREE), found, POINTS)] == []
+    assert [*agreement_answers(subject_of(TREE), Result(found, POINTS))] == []
 
 
 def test_a_system_is_compared_in_all_runtimes() -> None:
@@ -159,25 +161,6 @@ def test_a_system_is_compared_in_all_runtimes() -> None:
     assert not any(one.is_finding for one in found)
 
 
-def test_a_runtime_of_systems_in_which_nan_is_a_number_is_found() -> None:
-    system = system_of(block_of(A_LOW))
-    subject = subject_of(system)
-    question = queries(subject, "missing values")
-    load = find_runtime("native").load_system
-    assert load is not None
-    right = load(system)(question.values)
-    blind = load(system)(np.nan_to_num(question.values, nan=0.5))
-    (clean,) = conventions.system_answers(subject, question, [("one", right)] * 2)
-    assert not clean.is_finding
-    pairs = [("native", right), ("blind", blind)]
-    (finding,) = conventions.system_answers(subject, question, pairs)
-    assert finding.is_finding
-    assert finding.sentence.startswith(
-        "missing values: blind differs in 12 of 12 generated rows: generated row 1: a "
-    )
-    assert finding.sentence.endswith(": native gives a number to other outputs")
-
-
 # --- conventions
 
 
@@ -185,22 +168,6 @@ def tied_rules() -> RuleBase:
     """Return rules of which two are equally strong wherever they fire."""
     again = replace(RULES.rules[0], then="hard")
     return replace(RULES, rules=(*RULES.rules, again))
-
-
-def queries(subject: Subject, name: str) -> Convention:
-    return next(one for one in questions(subject) if one.name == name)
-
-
-def answered(
-    subject: Subject, question: Convention, representation: OnnxModel | None
-) -> list[AuditAnswer]:
-    """Return what the native runtime and a graph answer to a question."""
-    native = find_runtime("native").load(subject.rules)(question.values)
-    found = [ModelRun("native: rules", subject.rules, native)]
-    if representation is not None:
-        outcome = representation.run(question.values)
-        found.append(ModelRun("m.onnx: rules", subject.rules, outcome))
-    return [*conventions.convention_answers(subject, question, found)]
 
 
 def graph(rules: RuleBase) -> OnnxModel:
@@ -224,81 +191,45 @@ PLANTED = {
 }
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "ties",
-        "missing values",
-        "infinite values",
-        "ends of curves and cuts",
-        "far outside",
-    ],
-)
+@pytest.mark.parametrize("name", PLANTED)
 def test_a_graph_that_breaks_a_convention_is_found_and_a_right_one_is_not(
     name: str,
 ) -> None:
     rules = tied_rules()
     subject = subject_of(rules)
-    question = queries(subject, name)
-    assert question.values.shape[1] > 0
-    (clean,) = answered(subject, question, graph(rules))
-    assert not clean.is_finding
-    count = question.values.shape[1]
-    assert (
-        clean.sentence
-        == f"{name}: 2 representations give the same answers to {count} generated rows"
-    )
-    if name in PLANTED:
-        (finding,) = answered(subject, question, graph(PLANTED[name]))
-        assert finding.is_finding
-        assert finding.severity == "error"
-        assert finding.sentence.startswith(f"{name}: m.onnx: rules differs in ")
+    assert findings(subject, graph(rules)) == []
+    answers = findings(subject, graph(PLANTED[name]))
+    by_name = {one.subject: one for one in answers if one.code == "FT602"}
+    finding = by_name[f"{name}, file 1"]
+    assert finding.severity == "error"
+    assert finding.sentence.startswith(f"{name}: file 1 differs from the model: ")
 
 
-def test_a_runtime_in_which_nan_is_a_number_is_found() -> None:
-    subject = subject_of(RULES)
-    question = queries(subject, "missing values")
-    native = find_runtime("native").load(RULES)
-    blind = native(np.nan_to_num(question.values, nan=0.5))
-    found = [
-        ModelRun("native: rules", RULES, native(question.values)),
-        ModelRun("blind: rules", RULES, blind),
+def test_each_convention_is_answered_with_its_rows() -> None:
+    subject = subject_of(tied_rules())
+    result = agreement(subject, POINTS[:1])
+    found = {one.subject: one for one in convention_answers(subject, result)}
+    assert [*found] == [
+        *("missing values", "infinite values", "far outside"),
+        *("ties", "ends of curves and cuts"),
     ]
-    (finding,) = conventions.convention_answers(subject, question, found)
-    assert finding.sentence == (
-        "missing values: blind: rules differs in 6 of 6 generated rows: generated row "
-        "1: force nan: native: rules answers no class (missing), blind: rules soft "
-        "(rule 1)"
-    )
-    assert isinstance(finding.state, Computed)
+    pattern = r"ties: \d+ representations give the same answers to \d+ generated rows"
+    assert re.fullmatch(pattern, found["ties"].sentence)
 
 
-def test_the_witness_of_a_broken_convention_lies_in_the_domain() -> None:
+def test_a_row_with_a_missing_value_is_no_witness() -> None:
     subject = subject_of(RULES)
-    values = np.array([[math.nan, 7.0, 2.0]])
-    found = conventions.witness(subject, RULES, values)
+    one = Comparison("native: rules", "rules", "rows", 3, "DISAGREES", 1)
+    known = Result(Agreement("grip", "", ()), np.array([[math.nan, 7.0, 2.0]]))
+    found = witness(subject, replace(one, row_numbers=(0, 1, 2)), known)
     assert found is not None
     assert point_of(found.point) == {"force": 2}
     assert found.claims[0].label == "hard"
-    assert conventions.witness(subject, RULES, values[:, :2]) is None
+    assert witness(subject, replace(one, row_numbers=(0, 1)), known) is None
 
 
-def test_a_question_without_a_probe_says_so_and_one_with_too_many_too() -> None:
+def test_a_convention_that_no_row_shows_says_so() -> None:
     subject = subject_of(RULES)
-    (none,) = answered(subject, Convention("ties", np.empty((1, 0))), None)
-    assert none.sentence == "ties: no generated row shows it"
-    (some,) = answered(subject, Convention("ties", np.array([[1.0]]), 3), None)
-    assert isinstance(some.state, Computed)
-    assert some.state.how.endswith("; 3 more generated rows were left out")
-
-
-def test_probes_are_of_every_kind_and_stay_few() -> None:
-    tree = random_tree(3, leaves=12, inputs=9, combinations=0.0)
-    subject = subject_of(tree)
-    found = {one.name: one for one in questions(subject)}
-    assert all(one.values.shape[1] <= conventions.MOST for one in found.values())
-    assert np.isnan(found["missing values"].values).any(axis=1).all()
-    assert np.isinf(found["infinite values"].values).any(axis=1).all()
-    cuts = {cut for node in tree.nodes for cut in node.cuts}
-    assert cuts & set(found["ends of curves and cuts"].values.ravel().tolist())
-    assert found["far outside"].left_out > 0
+    result = Result(Agreement("grip", "", ()), np.empty((1, 0)))
+    found = [*convention_answers(subject, result)]
+    assert found[0].sentence == "missing values: no generated row shows it"

@@ -9,6 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.auditing.decide import Budget
@@ -18,7 +19,6 @@ from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.robustness import (
     RowDecider,
     answers,
-    radius,
     row_answers,
 )
 from fuzzytree.auditing.findings.subject import Subject
@@ -27,6 +27,11 @@ from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.testing import random_tree
 from tests.auditing.decide.old_bases import random_base
 from tests.auditing.findings.small_trees import one_cut, subject_of, two_cuts
+
+
+def radius(subject: Subject, row: Mapping[str, float]) -> AuditAnswer:
+    """Return the last of what is said of a row."""
+    return [*row_answers(replace(subject, row=row))][-1]
 
 
 def _number(answer: AuditAnswer, name: str) -> float:
@@ -107,14 +112,14 @@ def test_exact_ties_are_decided_by_the_order_of_rules() -> None:
 
 
 def test_a_row_has_its_decision_first_and_then_its_radius() -> None:
-    first, second = row_answers(subject_of(one_cut()), {"x": 0.75})
+    first, second = row_answers(replace(subject_of(one_cut()), row={"x": 0.75}))
     assert first.sentence == "the row is decided as 'b' by leaf 2"
     assert second.sentence.endswith("by more than 25 % of its range")
 
 
 def test_a_row_outside_the_domain_is_refused() -> None:
     with pytest.raises(ValueError, match="outside") as caught:
-        list(row_answers(subject_of(one_cut()), {"x": 1.5}))
+        list(row_answers(replace(subject_of(one_cut()), row={"x": 1.5})))
     assert str(caught.value) == (
         "the row lies outside the domain: 'x' is 1.5, and the domain is 0.0 to 1.0; "
         "widen it (--limits 'x=LOW:HIGH')"

@@ -93,26 +93,8 @@ def test_an_interval_holds_its_share_and_ends_at_certainty() -> None:
     assert wilson(0, 7)[0] == 0.0
     assert wilson(7, 7)[1] == 1.0
     for hits in range(8):
-        low, high = wilson(hits, 7, 0.5)
+        low, high = wilson(hits, 7)
         assert low <= hits / 7 <= high
-        assert wilson(hits, 7, 0.99)[0] <= low
-
-
-@pytest.mark.parametrize(
-    ("hits", "rows", "confidence", "text"),
-    [
-        (1, 0, 0.95, "no share: 1 of 0"),
-        (0, 0, 0.95, "no share: 0 of 0"),
-        (-1, 5, 0.95, "no share: -1 of 5"),
-        (1, 5, 1.0, "the confidence must lie in (0, 1), not 1.0"),
-    ],
-)
-def test_what_is_no_share_is_refused(
-    hits: int, rows: int, confidence: float, text: str
-) -> None:
-    with pytest.raises(ValueError) as caught:  # noqa: PT011
-        wilson(hits, rows, confidence)
-    assert str(caught.value) == text
 
 
 def test_rows_are_reported_rule_by_rule_and_together() -> None:
@@ -193,6 +175,7 @@ def test_counts_are_those_of_answers_in_fractions(conjunction: str) -> None:
     assert found.weak == sum(max(one.strengths) < level for one in known)
     assert found.tied == sum(not one.margin for one in covered)
     assert found.close == sum(one.margin <= margin for one in covered)
+    assert found.won is not None
     for k in range(len(rules.rules)):
         assert found.fired[k] == sum(one.strengths[k] > 0 for one in known)
         assert found.won[k] == sum(one.rule == k + 1 for one in known)
@@ -239,8 +222,6 @@ def test_points_are_drawn_within_the_domain_and_alike_for_a_seed() -> None:
     assert (points[1] == 2.0).all()
     assert np.array_equal(points, sample_points(rules, box, 400, 7))
     assert not np.array_equal(points[:, :9], sample_points(rules, box, 400, 8)[:, :9])
-    with pytest.raises(ValueError, match=r"^input 'slip' has no side in the domain$"):
-        sample_points(rules, Domain(box.sides[:1]), 5, 0)
 
 
 def test_shares_of_the_domain_are_reported_without_rows() -> None:
