@@ -228,6 +228,12 @@ class LR(MembershipFunction, frozen=True, tag="lr"):
         return tuple(sorted(knots))
 
     @property
+    def extent(self) -> tuple[float, float]:
+        """Where both tails end."""
+        low = self.mean - self.left.spread * self.left.reach
+        return low, self.mean + self.right.spread * self.right.reach
+
+    @property
     def is_bent_once(self) -> bool:
         """Not surely."""
         return False

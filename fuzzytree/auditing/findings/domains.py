@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.domain import Domain, DomainSide, whole_side
 from fuzzytree.auditing.findings.subject import AuditRows
@@ -22,7 +23,6 @@ from fuzzytree.model import (
     Formula,
     FuzzyTree,
     Linear,
-    Points,
     Variable,
     name_choice,
 )
@@ -62,7 +62,7 @@ def domain_of(
     limited: Iterable[str] = (),
     row: Mapping[str, float] | None = None,
 ) -> Domain:
-    """Return the domain of a model, a side for each input.
+    """Return the domain of a model, a side for each input that is not `limited`.
 
     Raises:
         ValueError: If an input has no such values; the sentence says what to give.
@@ -71,37 +71,60 @@ def domain_of(
         raise ValueError(f"spreads must be above 0 and finite, not {spreads!r}")
     if within == "data" and spreads is None and rows is None:
         raise ValueError("limits from data need rows (--data TABLE)")
-    left_out = set(limited)
+    curves = _curves(model)
+    queried = _queried(model, curves)
     sides: list[DomainSide] = []
     faults: list[str] = []
-    for position, axis in enumerate(_axes(model)):
-        values = None if rows is None else rows.values[position]
-        if axis.name in left_out:
+    inputs = [variable for variable in model.variables if not variable.parts]
+    for position, axis in enumerate(inputs):
+        name, codes = axis.name, len(axis.categories)
+        if name in set(limited):
             continue
+        values = None if rows is None else rows.values[position]
+        finite = np.empty(0) if values is None else values[np.isfinite(values)]
         try:
-            if axis.categories and (within == "model" or spreads is not None):
-                sides.append(DomainSide(axis.name, 0.0, axis.categories - 1.0, "model"))
+            if codes and (within == "model" or spreads is not None):
+                side = DomainSide(name, 0.0, codes - 1.0, "model")
             elif spreads is not None:
-                sides.append(_around(axis, spreads, values))
+                side = _spread_side(axis, curves[name], spreads, finite)
             elif within == "data":
-                sides.append(_seen(axis, values))
+                side = _data_side(axis, finite)
             else:
-                sides.append(_declared(axis, values))
+                side = _declared_side(axis, curves[name], values, finite)
         except ValueError as error:
-            if axis.is_used:
+            if name in queried:
                 faults.append(str(error))
-            else:
-                value = (row or {}).get(axis.name, 0.0)
-                ends = (0.0, 1.0, value if math.isfinite(value) else 0.0)
-                sides.append(DomainSide(axis.name, min(ends), max(ends), "unused"))
-        if sides and sides[-1].variable == axis.name:
-            sides[-1] = _with_values(sides[-1], axis, values)
+            value = (row or {}).get(name, 0.0)
+            ends = (0.0, 1.0, value if math.isfinite(value) else 0.0)
+            side = DomainSide(name, min(ends), max(ends), "unused")
+        sides.append(_with_values(side, axis, values, finite))
+    if len(faults) > _MOST_FAULTS:
+        faults[_MOST_FAULTS:] = [f"and {len(faults) - _MOST_FAULTS} more such inputs"]
     if faults:
-        more = [f"and {len(faults) - _MOST_FAULTS} more such inputs"]
-        raise ValueError(
-            "\n".join(faults[:_MOST_FAULTS] + (more if faults[_MOST_FAULTS:] else []))
-        )
+        raise ValueError("\n".join(faults))
     return Domain(tuple(sides))
+
+
+def _curves(model: Document) -> dict[str, list[Curve]]:
+    """Return the curves of each variable, with those that were fitted."""
+    curves: dict[str, list[Curve]] = {}
+    for variable in model.variables:
+        curves[variable.name] = [term.function for term in variable.terms]
+    for fitted in model.sets if isinstance(model, FuzzyTree) else ():
+        curves[fitted.variable] += [term.function for term in fitted.terms]
+    return curves
+
+
+def _queried(model: Document, curves: Mapping[str, Sequence[Curve]]) -> set[str]:
+    """Return the inputs on which something may depend."""
+    every = itertools.chain.from_iterable(curves.values())
+    if any(isinstance(curve, Formula | Linear) for curve in every):
+        return {*curves}  # which a formula may name
+    queried = {part.input for variable in model.variables for part in variable.parts}
+    for name, own in curves.items():
+        if any(curve != Band() for curve in own):
+            queried.add(name)
+    return queried
 
 
 def limited(domain: Domain, limits: Limits, model: Document) -> Domain:
@@ -174,22 +197,24 @@ def _read_ends(variable: Variable, text: str) -> tuple[float, float]:
     raise fault
 
 
-def _with_values(side: DomainSide, axis: _Axis, rows: FloatArray | None) -> DomainSide:
+def _with_values(
+    side: DomainSide, axis: Variable, values: FloatArray | None, finite: FloatArray
+) -> DomainSide:
     """Return a side with the values that rows can have, or that these rows have."""
-    seen = (
-        rows[np.isfinite(rows)] if side.origin == "data" and rows is not None else None
-    )
-    values: tuple[float, ...] = ()
-    if axis.categories:
-        codes = np.arange(axis.categories) if seen is None else np.unique(seen)
-        values = tuple(map(float, codes))
-    has_missing = seen is None or rows is None or len(seen) < len(rows)
-    missing = axis.missing if has_missing else None
-    side = msgspec.structs.replace(side, values=values, missing=missing)
+    codes, missing = tuple(map(float, range(len(axis.categories)))), axis.missing
+    if side.origin == "data" and values is not None:
+        codes = tuple(np.unique(finite).tolist()) if codes else ()
+        missing = missing if len(finite) < len(values) else None
+    side = replace(side, values=codes, missing=missing)
     return whole_side(side) if axis.is_whole else side
 
 
-def _declared(axis: _Axis, values: FloatArray | None) -> DomainSide:
+def _declared_side(
+    axis: Variable,
+    curves: Sequence[Curve],
+    values: FloatArray | None,
+    finite: FloatArray,
+) -> DomainSide:
     """Return the range of an input, or the span of its curves, or of its rows.
 
     Raises:
@@ -198,16 +223,17 @@ def _declared(axis: _Axis, values: FloatArray | None) -> DomainSide:
     name, low, high = axis.name, axis.low, axis.high
     if low is not None and high is not None:
         return DomainSide(name, low, high, "model")
-    ends = [*axis.ends, *(one for one in (low, high) if one is not None)]
-    if not axis.ends and values is not None:
-        return _seen(axis, values)
-    if not axis.ends:
+    ends = [end for curve in curves for end in curve.extent or ()]
+    if not ends:
+        if values is not None:
+            return _data_side(axis, finite)
         raise ValueError(
             f"input {name!r} has neither a range nor a curve to take its limits from; "
             f"give {_limits_of(name)}, or rows (--data TABLE)"
         )
+    ends += [end for end in (low, high) if end is not None]
     width = 0.0
-    if axis.is_open or max(ends) == min(ends):
+    if any(curve.is_open for curve in curves) or max(ends) == min(ends):
         width = max(ends) - min(ends) or max(abs(ends[0]), 1.0)
     low = min(ends) - width if low is None else low
     high = max(ends) + width if high is None else high
@@ -219,44 +245,37 @@ def _declared(axis: _Axis, values: FloatArray | None) -> DomainSide:
     return DomainSide(name, low, high, "curves")
 
 
-def _seen(axis: _Axis, values: FloatArray | None) -> DomainSide:
+def _data_side(axis: Variable, finite: FloatArray) -> DomainSide:
     """Return the smallest and the largest value of the rows.
 
     Raises:
         ValueError: If there is none.
     """
-    finite = np.empty(0) if values is None else values[np.isfinite(values)]
-    if not finite.size:
-        raise ValueError(
-            f"the rows have no value of input {axis.name!r}; "
-            f"give {_limits_of(axis.name)}"
-        )
-    return DomainSide(axis.name, float(finite.min()), float(finite.max()), "data")
+    if finite.size:
+        return DomainSide(axis.name, float(finite.min()), float(finite.max()), "data")
+    fault = f"the rows have no value of input {axis.name!r}"
+    raise ValueError(f"{fault}; give {_limits_of(axis.name)}")
 
 
-def _around(axis: _Axis, spreads: float, values: FloatArray | None) -> DomainSide:
+def _spread_side(
+    axis: Variable, curves: Sequence[Curve], spreads: float, finite: FloatArray
+) -> DomainSide:
     """Return the span of some spreads around the sets of an input, or its rows' mean.
 
     Raises:
         ValueError: If it has no sets, and there are no rows.
     """
-    ends = [
-        end
-        for one in axis.sets
-        for end in (
-            one.mean - spreads * one.left.spread,
-            one.mean + spreads * one.right.spread,
-        )
-    ]
-    if not ends:
-        finite = np.empty(0) if values is None else values[np.isfinite(values)]
-        if not finite.size:
-            raise ValueError(
-                f"input {axis.name!r} has no fitted sets to count spreads from; "
-                f"give rows (--data TABLE), or {_limits_of(axis.name)}"
-            )
+    sets = [curve for curve in curves if isinstance(curve, LR)]
+    ends = [one.mean - spreads * one.left.spread for one in sets]
+    ends += [one.mean + spreads * one.right.spread for one in sets]
+    if not ends and finite.size:
         mean, spread = float(np.mean(finite)), float(np.std(finite))
         ends = [mean - spreads * spread, mean + spreads * spread]
+    if not ends:
+        raise ValueError(
+            f"input {axis.name!r} has no fitted sets to count spreads from; "
+            f"give rows (--data TABLE), or {_limits_of(axis.name)}"
+        )
     if not all(map(math.isfinite, ends)):
         raise ValueError(
             f"{spreads!r} spreads of input {axis.name!r} span more than doubles hold"
@@ -266,68 +285,3 @@ def _around(axis: _Axis, spreads: float, values: FloatArray | None) -> DomainSid
 
 def _limits_of(name: str) -> str:
     return f"its limits (--limits {f'{name}=LOW:HIGH'!r})"
-
-
-class _Axis(msgspec.Struct, frozen=True):
-    """What a model says about the values of an input."""
-
-    name: str
-    low: float | None
-    high: float | None
-    ends: tuple[float, ...]
-    is_open: bool
-    sets: tuple[LR, ...]
-    is_used: bool
-    categories: int
-    missing: float | None
-    is_whole: bool
-
-
-def _axes(model: Document) -> Iterator[_Axis]:
-    """Yield the inputs of a model, in its order."""
-    curves: dict[str, list[Curve]] = {}
-    for one in model.variables:
-        curves[one.name] = [term.function for term in one.terms]
-    for fitted in model.sets if isinstance(model, FuzzyTree) else ():
-        curves[fitted.variable] += [term.function for term in fitted.terms]
-    summed = {part.input for one in model.variables for part in one.parts}
-    every = itertools.chain.from_iterable(curves.values())
-    if any(isinstance(curve, Formula | Linear) for curve in every):
-        summed = {*curves}  # which they may name
-    for one in model.variables:
-        if not one.parts:
-            own = curves[one.name]
-            ends = tuple(end for curve in own for end in _ends(curve))
-            sets = tuple(curve for curve in own if isinstance(curve, LR))
-            is_used = one.name in summed or any(curve != Band() for curve in own)
-            is_open = any(map(_is_open, own))
-            rows = len(one.categories), one.missing, one.is_whole
-            facts = is_open, sets, is_used, *rows
-            yield _Axis(one.name, one.low, one.high, ends, *facts)
-
-
-def _is_open(curve: Curve) -> bool:
-    """Return whether a curve stays above 0 without end."""
-    match curve:
-        case Band(low=low, high=high):
-            return low is None or high is None
-        case Points(degrees=degrees):
-            return degrees[0] > 0.0 or degrees[-1] > 0.0
-        case LR():
-            return False
-        case _:
-            return curve.is_open
-
-
-def _ends(curve: Curve) -> Iterator[float]:
-    """Yield the values between which a curve changes; of formulas, none."""
-    match curve:
-        case Band(low=low, high=high, left=left, right=right):
-            yield from (one for one in (low, high, left, right) if one is not None)
-        case LR(mean=mean, left=left_side, right=right_side):
-            yield mean - left_side.spread * left_side.reach
-            yield mean + right_side.spread * right_side.reach
-        case Points(values=values):
-            yield from (values[0], values[-1])
-        case _:
-            yield from curve.extent or ()

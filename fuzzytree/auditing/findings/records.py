@@ -45,14 +45,7 @@ class TermName(Value, frozen=True):
 
 
 class Measure(Value, frozen=True):
-    """A number that belongs to an answer.
-
-    Attributes:
-        name: What it is, such as `largest lead`.
-        value: The number, as a double or a count.
-        exact: The same as `p/q`, where it is known.
-        unit: Its unit; empty for degrees, shares and counts.
-    """
+    """A number that belongs to an answer; `exact` is `p/q`, where it is known."""
 
     name: str
     value: float
@@ -64,8 +57,7 @@ class AuditAnswer(Value, frozen=True):
     """One question about a model, and what is known.
 
     Attributes:
-        code: The kind of question, such as `FT101`; see
-            `fuzzytree.auditing.findings.codes`.
+        code: The kind of question, such as `FT101`.
         subject: The subject of the question, such as `rule 3`.
         sentence: The answer as one sentence without its code.
         state: How it is known.
@@ -80,10 +72,8 @@ class AuditAnswer(Value, frozen=True):
         repeat: The command that finds it again.
         id: Names the finding across releases: the code and a hash of what the rules
             and terms concerned say, whatever their order in the file is.
-        message: What kind of sentence it is; see
-            `fuzzytree.rechecking.sentences`.
-        facts: What the sentence says besides the subject, the measures, the region
-            and the state.
+        message: The kind of sentence; see `fuzzytree.rechecking.sentences`.
+        facts: What the sentence says besides.
     """
 
     code: str
@@ -152,11 +142,7 @@ class SourceFile(Value, frozen=True):
 class VerbResult(Value, frozen=True):
     """What another verb found of the same model, as the user gave it.
 
-    Attributes:
-        verb: Which verb.
-        file: Where it was read from.
-        parts: How many comparisons and bounds, or criteria, it is of.
-        wrong: How many of them disagree, or fail.
+    Of `parts` comparisons and bounds, or criteria, `wrong` disagree, or fail.
     """
 
     verb: Literal["check", "stability"]
@@ -168,12 +154,8 @@ class VerbResult(Value, frozen=True):
 class Policy(Value, frozen=True):
     """How the audited rules decide, which says which questions apply.
 
-    Attributes:
-        conjunction: The AND: `minimum`, `product`, or another norm's name.
-        decision: `strongest` (the class of the first of the strongest rules) or `all`
-            (every rule that fires takes part in the answer).
-        uncovered: The answer where no rule fires; None is no class.
-        missing: The answer where a value is missing; None is no class.
+    The class is that of the first of the `strongest` rules, or `all` that fire take
+    part in the answer. Where none fires it is `uncovered`, without a value `missing`.
     """
 
     conjunction: str
@@ -186,17 +168,11 @@ class Audit(Value, frozen=True):
     """The result of an audit.
 
     Attributes:
-        version: Of fuzzytree.
-        model: The model's name.
         form: What was audited: `tree`, `relative rules`, `raw rules`, `rules` or
             `system`.
         fingerprint: The SHA-256 of the model's content.
         file: Where it was read from, None if from memory.
-        data: The table that was given, if one was.
-        rows: How many rows it has.
-        policy: How the rules decide.
-        domain: The domain of all answers.
-        settings: The thresholds.
+        data: The table that was given, if one was; `rows` is how many it has.
         answers: All answers, findings and others, in order of their codes.
         unasked: Questions without an answer and why, in sentences: left out by the
             user, the budget or an interruption.
@@ -248,8 +224,7 @@ class Audit(Value, frozen=True):
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
         page = importlib.import_module("fuzzytree.report.notebook")
-        shown: str = page.audit_html(self)
-        return shown
+        return str(page.audit_html(self))
 
     def to_json(self) -> str:
         """Return the audit for programs, and for `recheck`, as indented JSON."""

@@ -198,7 +198,8 @@ def witness(subject: Subject, compared: Comparison, result: Result) -> Witness |
 def convention_answers(subject: Subject, result: Result) -> Iterator[AuditAnswer]:
     """Yield for each convention which representation breaks it, or that none does."""
     every = [c for c in result.agreement.comparisons if c.basis == "rows"]
-    alike = [c for c in every if c.verdict == "agrees"]
+    most = max((c.rows for c in every), default=0)
+    alike = [c for c in every if c.verdict == "agrees" and c.rows == most]
     names = dict.fromkeys(name for c in alike for name in (c.representation, c.against))
     for convention, rows in _conventions(subject, result.values).items():
         numbers = {result.first + row for row in rows}
