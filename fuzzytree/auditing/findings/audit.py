@@ -93,9 +93,6 @@ def audit(
         report: Called with what is done now, and with its share in [0, 1] of all.
         repeat: The command that repeats this audit.
 
-    Raises:
-        ValueError: If a code or a setting is none, or the domain is not known.
-
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> counts = AuditSelection(select=["FT501"])
@@ -156,12 +153,7 @@ def audit(
 
 
 def smt_text(result: Audit, model: Document) -> str:
-    """Return a model and what is PROVED of it as SMT-LIB 2, for any solver.
-
-    Raises:
-        LossError: If the model cannot be written.
-        ReadError: If it cannot be said for a solver.
-    """
+    """Return a model and what is PROVED of it as SMT-LIB 2, for any solver."""
     try:
         return claims_text(
             *_for_solver(result, _audited(view(model, result.domain), model))
@@ -217,11 +209,7 @@ def with_confirmations(
 
 
 def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
-    """Refuse a row without a finite value for each input.
-
-    Raises:
-        ValueError: If it is one.
-    """
+    """Refuse a row without a finite value for each input."""
     for name, value in row.items():
         if name not in inputs:
             raise ValueError(

@@ -32,11 +32,7 @@ class Baseline(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def read_baseline(path: PathLike) -> Mapping[str, str]:
-    """Return the accepted findings' sentences by id.
-
-    Raises:
-        ReadError: If the file is no baseline.
-    """
+    """Return the accepted findings' sentences by id."""
     content = read_bounded(path, _MOST_BYTES)
     try:
         accepted = msgspec.json.decode(content, type=Baseline).accepted

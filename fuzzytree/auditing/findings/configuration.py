@@ -54,10 +54,6 @@ def chosen_codes(select: Sequence[str] = (), skip: Sequence[str] = ()) -> set[st
     The reasons are always included: without them the other answers seem to be about
     more than they are.
 
-    Raises:
-        ValueError: If one is the beginning of no code, a reason for declining is to be
-            left out, or no code is left.
-
     Example:
         >>> sorted(chosen_codes(["FT10"], ["FT102", "FT103"]))[:5]
         ['FT101', 'FT104', 'FT105', 'FT106', 'FT107']
@@ -86,11 +82,7 @@ def chosen_codes(select: Sequence[str] = (), skip: Sequence[str] = ()) -> set[st
 
 
 def check_settings(settings: AuditSettings) -> None:
-    """Refuse settings outside their ranges.
-
-    Raises:
-        ValueError: If one is; in a sentence.
-    """
+    """Refuse settings outside their ranges."""
     for name, (high, allowed) in _RANGES.items():
         value = getattr(settings, name)
         if not 0.0 < value <= high:
@@ -105,9 +97,6 @@ def settings_with(settings: AuditSettings, texts: Mapping[str, str]) -> AuditSet
     """Return settings with others for some names, as a user writes them.
 
     The budget is not among them.
-
-    Raises:
-        ValueError: If there is no such setting, or its value is none.
 
     Example:
         >>> settings_with(AuditSettings(), {"epsilon": "0.2"}).epsilon
@@ -191,11 +180,7 @@ class Configuration(FileRecord, frozen=True, kw_only=True):
 
 
 def read_configuration(path: PathLike) -> Configuration:
-    """Return what a file of configuration says.
-
-    Raises:
-        ReadError: If it is none; it lists all mistakes with their places.
-    """
+    """Return what a file of configuration says."""
     result = configuration(read_bounded(path, _MOST_BYTES), str(path))
     if result.baseline is None:
         return result
@@ -204,11 +189,7 @@ def read_configuration(path: PathLike) -> Configuration:
 
 
 def configuration(content: bytes, name: str) -> Configuration:
-    """Return what the content of a file of configuration says.
-
-    Raises:
-        ReadError: As `read_configuration`.
-    """
+    """Return what the content of a file of configuration says."""
     root, mistakes = compose(content, name)
     bound = bind(root, Configuration, mistakes)
     if bound is None or mistakes:

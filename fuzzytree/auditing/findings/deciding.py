@@ -7,8 +7,6 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Final
 
-from msgspec.structs import replace
-
 from fuzzytree.auditing.decide import Answer, Open, Point
 from fuzzytree.auditing.decide import Proved as NoPoint
 from fuzzytree.auditing.decide.cover import Sides, around, gap, least_cover
@@ -24,7 +22,7 @@ from fuzzytree.auditing.decide.states import (
 )
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
-from fuzzytree.auditing.findings.robustness import rank_by_distance
+from fuzzytree.auditing.findings.robustness import distance_measure, nearest_rows
 from fuzzytree.auditing.findings.subject import Subject, state_of
 from fuzzytree.numerics import outwards
 
@@ -275,24 +273,35 @@ def _gaps(subject: Subject, first: Point) -> Iterator[AuditAnswer]:
         message = "FT301.gap-with-class"
     elif subject.policy.decision == "all":
         message = "FT301.gap-of-system"
-    gaps: list[AuditAnswer] = []
+    points: list[Point] = []
     boxes: list[Sides] = []
     answer: Answer = first
-    while isinstance(answer, Point) and len(gaps) < MOST_GAPS:
+    while isinstance(answer, Point) and len(boxes) < MOST_GAPS:
+        points.append(answer)
         boxes.append(around(subject.base, answer.values, Fraction(0)))
-        state = _below(subject, answer, Fraction(0), boxes[-1])
-        facts = {"then": label}
-        gaps.append(
-            audit_answer(message, "gap", state, region=state.region, facts=facts)
-        )
         answer = gap(subject.base, subject.budget, boxes)
+    order: list[int] = [*range(len(boxes))]
+    rows: list[tuple[Fraction, int]] = []
     if subject.rows is not None:
         variables = subject.rules.variables
-        gaps = [*rank_by_distance(gaps, subject.rows, subject.domain, variables)]
-    for number, found in enumerate(gaps, 1):
-        yield replace(found, subject=f"gap {number}")
+        rows = nearest_rows(boxes, subject.rows, subject.domain, variables)
+        order.sort(key=lambda place: rows[place][0] if rows else 0)
+    for number, place in enumerate(order, 1):
+        state = _below(subject, points[place], Fraction(0), boxes[place])
+        measures = list[Measure]()
+        if rows:
+            away, row = rows[place]
+            measures.append(distance_measure("distance to the nearest row", away))
+            measures.append(Measure("nearest row", row))
+        yield audit_answer(
+            message,
+            f"gap {number}",
+            state,
+            *measures,
+            region=state.region,
+            facts={"then": label},
+        )
     if not isinstance(answer, NoPoint):
-        reason = f"{MOST_GAPS} gaps at most are looked for, within the budget"
-        rest = Declined("FTD05", reason)
-        facts_of_rest = {"count": len(gaps)}
-        yield audit_answer("FT301.more", "more gaps", rest, facts=facts_of_rest)
+        why = f"{MOST_GAPS} gaps at most are looked for, within the budget"
+        rest, count = Declined("FTD05", why), {"count": len(boxes)}
+        yield audit_answer("FT301.more", "more gaps", rest, facts=count)

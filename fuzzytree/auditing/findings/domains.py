@@ -62,11 +62,7 @@ def domain_of(
     limited: Iterable[str] = (),
     row: Mapping[str, float] | None = None,
 ) -> Domain:
-    """Return the domain of a model, a side for each input that is not `limited`.
-
-    Raises:
-        ValueError: If an input has no such values; the sentence says what to give.
-    """
+    """Return the domain of a model, a side for each input that is not `limited`."""
     if spreads is not None and not (math.isfinite(spreads) and spreads > 0.0):
         raise ValueError(f"spreads must be above 0 and finite, not {spreads!r}")
     if within == "data" and spreads is None and rows is None:
@@ -131,10 +127,6 @@ def limited(domain: Domain, limits: Limits, model: Document) -> Domain:
     """Return a domain with other ends for some variables.
 
     A stand-in for missing values stays where it lies between the ends, or is named.
-
-    Raises:
-        ValueError: If a variable or a value is unknown, or ends are swapped or not
-            finite.
 
     Example:
         >>> from fuzzytree.model import Rule, RuleBase, Variable
@@ -215,11 +207,7 @@ def _declared_side(
     values: FloatArray | None,
     finite: FloatArray,
 ) -> DomainSide:
-    """Return the range of an input, or the span of its curves, or of its rows.
-
-    Raises:
-        ValueError: If it has none.
-    """
+    """Return the range of an input, or the span of its curves, or of its rows."""
     name, low, high = axis.name, axis.low, axis.high
     if low is not None and high is not None:
         return DomainSide(name, low, high, "model")
@@ -246,11 +234,7 @@ def _declared_side(
 
 
 def _data_side(axis: Variable, finite: FloatArray) -> DomainSide:
-    """Return the smallest and the largest value of the rows.
-
-    Raises:
-        ValueError: If there is none.
-    """
+    """Return the smallest and the largest value of the rows."""
     if finite.size:
         return DomainSide(axis.name, float(finite.min()), float(finite.max()), "data")
     fault = f"the rows have no value of input {axis.name!r}"
@@ -260,11 +244,7 @@ def _data_side(axis: Variable, finite: FloatArray) -> DomainSide:
 def _spread_side(
     axis: Variable, curves: Sequence[Curve], spreads: float, finite: FloatArray
 ) -> DomainSide:
-    """Return the span of some spreads around the sets of an input, or its rows' mean.
-
-    Raises:
-        ValueError: If it has no sets, and there are no rows.
-    """
+    """Return some spreads around the sets of an input, or around the mean of rows."""
     sets = [curve for curve in curves if isinstance(curve, LR)]
     ends = [one.mean - spreads * one.left.spread for one in sets]
     ends += [one.mean + spreads * one.right.spread for one in sets]

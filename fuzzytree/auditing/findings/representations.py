@@ -34,8 +34,16 @@ from fuzzytree.auditing.findings.support import (
     sampled_share,
 )
 from fuzzytree.checking import check
-from fuzzytree.model import Agreement, Certified, Comparison, Dtype, FuzzyTree, Model
-from fuzzytree.numerics import TIE, Certificate, certify, decide, exact_answer
+from fuzzytree.model import (
+    Agreement,
+    Certified,
+    Comparison,
+    Dtype,
+    FuzzyTree,
+    Model,
+    Variable,
+)
+from fuzzytree.numerics import TIE, certify, decide, exact_answer
 from fuzzytree.runtimes import all_runtimes
 from fuzzytree.semantics import forms, probe_values
 
@@ -253,19 +261,21 @@ def _certified(
     subject: Subject, certified: Certified, form: Model, how: str
 ) -> Iterator[AuditAnswer]:
     """Yield the bound of a number type's error, and where it leaves a class open."""
-    name = certified.representation
+    name, measures = certified.representation, list[Measure]()
     if certified.verdict == "DISAGREES":
         facts = {"detail": "; ".join(certified.detail[:2])}
         state: State = Computed("each row was compared with its exact answer")
         yield audit_answer("FT601.exceeds", name, state, facts=facts)
     bound = certify(_within(form, subject.domain), cast("Dtype", certified.dtype))
-    measures = []
+    state = Computed(bound.origin.replace("the declared ranges", "the domain"))
     if bound.delta is not None:
         measures.append(Measure("certified error of a strength", bound.delta))
         measures.append(Measure("margin that is certain", 2.0 * bound.delta))
+    elif bound.reasons:
+        of = f"the largest error of a strength of {name}"
+        state = Bracket(of, certified.largest or 0.0, 1.0, "; ".join(bound.reasons))
     if certified.largest is not None:
         measures.append(Measure("largest error seen", certified.largest))
-    state = _bounded(bound, certified)
     facts = {"bound": bound.sentence}
     yield audit_answer("FT601.certified", name, state, *measures, facts=facts)
     if certified.on == "data" and certified.rows:
@@ -276,20 +286,11 @@ def _certified(
         yield audit_answer("FT601.band", f"{name}, its band", state, facts=facts)
 
 
-def _bounded(bound: Certificate, certified: Certified) -> State:
-    if bound.delta is not None or not bound.reasons:
-        return Computed(bound.origin.replace("the declared ranges", "the domain"))
-    of = f"the largest error of a strength of {certified.representation}"
-    return Bracket(of, certified.largest or 0.0, 1.0, "; ".join(bound.reasons))
-
-
 def _within(form: Model, domain: Domain) -> Model:
     """Return a model that declares the domain as the ranges of its variables."""
-    sides = {side.variable: side for side in domain.sides}
-    variables = tuple(
-        replace(one, low=sides[one.name].low, high=sides[one.name].high)
-        if one.name in sides
-        else one
-        for one in form.variables
-    )
-    return replace(form, variables=variables)
+    sides = {side.variable: (side.low, side.high) for side in domain.sides}
+    variables: list[Variable] = []
+    for variable in form.variables:
+        low, high = sides.get(variable.name, (variable.low, variable.high))
+        variables.append(replace(variable, low=low, high=high))
+    return replace(form, variables=tuple(variables))

@@ -39,10 +39,6 @@ def read_results(
     Args:
         paths: Their files, at most one of each verb.
         model: The model that they must be about.
-
-    Raises:
-        ReadError: If a file is none of these, was changed by hand, is about another
-            model or of another version, or another one is of the same verb.
     """
     results: dict[str, LoadedResult] = {}
     for path in paths:

@@ -9,11 +9,11 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.contest import decided
 from fuzzytree.auditing.decide.costs import Costs, Nearest
+from fuzzytree.auditing.decide.cover import Sides
 from fuzzytree.auditing.decide.domain import (
     Domain,
     DomainSide,
@@ -30,11 +30,9 @@ from fuzzytree.auditing.decide.states import (
     Declined,
     Proved,
     Representation,
-    Span,
     State,
     Witness,
     coordinates,
-    point_of,
 )
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.leaves import too_many_boxes
@@ -82,11 +80,7 @@ class RowDecider:
 
 
 def row_answers(subject: Subject) -> Iterator[AuditAnswer]:
-    """Yield how a row is decided, and how far the nearest other decision is.
-
-    Raises:
-        ValueError: If the row lies outside the domain.
-    """
+    """Yield how a row is decided, and how far the nearest other decision is."""
     if subject.row is None:
         return
     declined = _declined(subject)
@@ -275,24 +269,22 @@ def _summary(
 # --- gaps
 
 
-def rank_by_distance(
-    gaps: Sequence[AuditAnswer],
+def nearest_rows(
+    boxes: Sequence[Sides],
     rows: AuditRows,
     domain: Domain,
     variables: Sequence[Variable],
-) -> tuple[AuditAnswer, ...]:
-    """Return gaps in order of how near they are to a row, with the distance.
+) -> list[tuple[Fraction, int]]:
+    """Return how far each of some boxes is from the nearest row, and its number.
 
-    A gap far from all that was ever seen matters less than one among the rows. It is
-    measured from its region, or else from the point of its witness.
+    A gap far from all that was ever seen matters less than one among the rows. Nothing
+    is returned without a complete row.
     """
     inputs = [variable.name for variable in variables if not variable.parts]
-    sums = {variable.name: variable for variable in variables if variable.parts}
-    boxes = [_box(gap, domain, sums) for gap in gaps]
-    parts = Polytopes(
-        inputs, [polytope_of(box, inputs, sums.values()) for box in boxes]
-    )
+    sums = [variable for variable in variables if variable.parts]
     costs = Costs(domain, inputs)
+    every = [_part(domain, sides, sums) for sides in boxes]
+    parts = Polytopes(inputs, [polytope_of(part, inputs, sums) for part in every])
     fixed = {side.variable: side.low for side in domain.sides if side.low == side.high}
     points = {
         number: {
@@ -302,43 +294,30 @@ def rank_by_distance(
         for number, values in enumerate(rows.values.T.tolist(), 1)
         if all(map(math.isfinite, values))
     }
-    if not points:
-        return (*gaps,)
     bounds = {number: parts.bounds(point, costs) for number, point in points.items()}
-    ranked: list[tuple[Fraction, AuditAnswer]] = []
-    for place, gap in enumerate(gaps):
+    result: list[tuple[Fraction, int]] = []
+    for place in range(len(boxes) if points else 0):
         best: tuple[Fraction, int] | None = None
-        for bound, number in sorted(
-            (bounds[number][place], number) for number in points
-        ):
-            if best is not None and bound > best[0]:
+        for number in sorted(points, key=lambda number: bounds[number][place]):
+            if best is not None and bounds[number][place] > best[0]:
                 break
             low = parts.nearest(points[number], [place], costs).low
             best = (low, number) if best is None or low < best[0] else best
         assert best is not None  # there is a point
-        measures = (
-            distance_measure("distance to the nearest row", best[0]),
-            Measure("nearest row", best[1]),
-        )
-        ranked.append((best[0], replace(gap, measures=(*gap.measures, *measures))))
-    return tuple(gap for _, gap in sorted(ranked, key=lambda pair: pair[0]))
+        result.append(best)
+    return result
 
 
-def _box(gap: AuditAnswer, domain: Domain, sums: Mapping[str, Variable]) -> Domain:
-    """Return where a gap is: its region, else its point."""
-    spans = gap.region
-    if not spans and isinstance(gap.state, Witness):
-        point = point_of(gap.state.point)
-        spans = tuple(Span(name, *outwards(value)) for name, value in point.items())
+def _part(domain: Domain, box: Sides, sums: Sequence[Variable]) -> Domain:
+    """Return the part of a domain in a box."""
     sides = {side.variable: side for side in domain.sides}
-    for span in spans:
-        name = span.variable
+    combined = {variable.name: variable for variable in sums}
+    for name, (low, high) in box.items():
         if name not in sides:
-            low, high = ends_on(sums[name], domain)
-            sides[name] = DomainSide(name, outwards(low)[0], outwards(high)[1])
+            ends = ends_on(combined[name], domain)
+            sides[name] = DomainSide(name, outwards(ends[0])[0], outwards(ends[1])[1])
         whole = sides[name]
-        least = whole.low if span.low is None else max(whole.low, span.low)
-        most = whole.high if span.high is None else min(whole.high, span.high)
+        least, most = max(whole.low, float(low)), min(whole.high, float(high))
         values = tuple(x for x in whole.points if least <= x <= most)
         sides[name] = DomainSide(name, least, most, values=values)
     return Domain(tuple(sides.values()))

@@ -170,11 +170,7 @@ def subject_of(
     rows: AuditRows | None = None,
     row: Mapping[str, float] | None = None,
 ) -> Subject:
-    """Return the rules of a view, ready for questions.
-
-    Raises:
-        ValueError: If it has none, or an input has no side.
-    """
+    """Return the rules of a view, ready for questions."""
     is_class = viewed.policy.decision == "strongest" or viewed.system is None
     asked = viewed.rules if is_class else viewed.system
     if asked is None:

@@ -101,9 +101,6 @@ def read_value(variable: Variable, text: str) -> float:
 
     An empty text, or `missing`, is what stands for a missing value.
 
-    Raises:
-        ValueError: If it is none; the sentence says what would be one.
-
     Example:
         >>> read_value(Variable("city", categories=("Bern", "Rom")), "Rom")
         1.0

@@ -280,36 +280,30 @@ def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
 
 def _excesses(of: VariableRange, term: Term, shape: LR) -> Iterator[AuditAnswer | None]:
     """Yield where the polynomials of a set leave [0, 1] before they are clipped."""
-    mean = Fraction(shape.mean)
-    how = Computed("the polynomial was evaluated in fractions")
+    mean, state = (
+        Fraction(shape.mean),
+        Computed("the polynomial was evaluated in fractions"),
+    )
     for side, sign in ((shape.left, -1), (shape.right, 1)):
         spread = sign * Fraction(side.spread)
         low, high = sorted((mean, mean + spread))
         low, high = max(low, of.low), min(high, of.high)
-        if low >= high:
-            continue
-        x = tuple(low + (high - low) * n / _SAMPLES for n in range(_SAMPLES + 1))
-        first, step = (low - mean) / spread, (high - low) / spread / _SAMPLES
-        values = tuple(
-            _polynomial(side.curve, first + n * step) for n in range(_SAMPLES + 1)
-        )
-        lines = Lines(x, values, values[:-1], values[1:])
-        for message, over in (("FT402.above", lines), ("FT402.below", lines.negated())):
-            if max(over.at) <= 1:
-                continue
-            cut = combined([over, constant(ONE, low, high)], max)
-            runs = itertools.groupby(cut.pieces(), lambda piece: max(piece[2:]) > 1)
-            for run in [[*pieces] for is_over, pieces in runs if is_over]:
-                ends = run[0][0], run[-1][1]
-                most, at = max(
-                    (v, -x) for a, b, p, q in run for v, x in ((p, a), (q, b))
-                )
+        step = (high - low) / _SAMPLES
+        x = [low + n * step for n in range(_SAMPLES + 1)] if step > 0 else []
+        degrees = [_polynomial(side.curve, (at - mean) / spread) for at in x]
+        above, below = [v - 1 for v in degrees], [-v for v in degrees]
+        for message, excesses in (("FT402.above", above), ("FT402.below", below)):
+            over = [(v, -at) for v, at in zip(excesses, x, strict=True)]
+            places = [-at for excess, at in over if excess > 0]
+            if places:
+                most, at = max(over)
                 numbers = (
-                    Measure("excess", float(most - 1)),
+                    Measure("excess", float(most)),
                     Measure("place of the excess", float(-at), unit=of.variable.unit),
                 )
-                answer = _about(message, of, [term], how, *numbers, ends=ends)
-                yield answer if most - 1 >= SHALLOW else None
+                ends = max(places[0] - step, low), min(places[-1] + step, high)
+                answer = _about(message, of, [term], state, *numbers, ends=ends)
+                yield answer if most >= SHALLOW else None
 
 
 def _polynomial(curve: Sequence[float], t: Fraction) -> Fraction:

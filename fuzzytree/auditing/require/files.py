@@ -45,11 +45,7 @@ class RequirementsFile(FileRecord, frozen=True, kw_only=True):
 
 
 def read_requirements(path: PathLike, model: Document) -> tuple[Requirement, ...]:
-    """Return the requirements of a file about a model.
-
-    Raises:
-        ReadError: If it has none; it lists all mistakes with their places.
-    """
+    """Return the requirements of a file about a model."""
     root, mistakes = compose(read_bounded(path, _MOST_BYTES), str(path))
     record = bind(root, RequirementsFile, mistakes)
     results: list[Requirement] = []

@@ -72,9 +72,6 @@ def parse_requirement(text: str, model: Document, where: str = "") -> Requiremen
         model: The model.
         where: More conditions.
 
-    Raises:
-        ValueError: If it is none, names what is not there, or contradicts itself.
-
     Example:
         >>> from fuzzytree.testing import random_system
         >>> system = random_system(1)
@@ -108,11 +105,7 @@ def parse_requirement(text: str, model: Document, where: str = "") -> Requiremen
 
 
 def _add_conditions(text: str, spans: dict[str, _Spans], model: Document) -> None:
-    """Add what conditions, joined by `and`, leave of the values of variables.
-
-    Raises:
-        ValueError: If one is none, or they leave no value.
-    """
+    """Add what conditions, joined by `and`, leave of the values of variables."""
     position = 0
     while text[position:].strip():
         match = _CONDITION.match(text, position)

@@ -59,9 +59,6 @@ def comply(
         steps: The budget of each question.
         title: The file of the model, if it has one.
         source: The file of the requirements.
-
-    Raises:
-        ValueError: If no row meets the conditions of a requirement.
     """
     if steps < 1:
         raise ValueError(f"the budget must be 1 step or more, not {steps}")
@@ -134,11 +131,7 @@ def _outcome(model: Document, claim: Claim, domain: Domain, steps: int) -> Outco
 
 
 def _part(model: Document, domain: Domain, of: Requirement, box: Box) -> Domain:
-    """Return the rows of a domain in a box, whose ends replace those of the domain.
-
-    Raises:
-        ValueError: If there is none.
-    """
+    """Return the rows of a domain in a box, whose ends replace those of the domain."""
     columns = {variable.name: variable for variable in model.variables}
     sides: list[DomainSide] = []
     for side in domain.sides:
