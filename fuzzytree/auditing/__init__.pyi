@@ -24,9 +24,6 @@ from .diff.differences import joined_domain as joined_domain
 from .findings.audit import audit as audit
 from .findings.audit import smt_text as smt_text
 from .findings.audit import source_of as source_of
-from .findings.baselines import baseline_of as baseline_of
-from .findings.baselines import read_baseline as read_baseline
-from .findings.baselines import resolved_ids as resolved_ids
 from .findings.codes import CODES as CODES
 from .findings.codes import Code as Code
 from .findings.configuration import FILE as FILE
@@ -51,7 +48,10 @@ from .findings.records import Measure as Measure
 from .findings.records import Severity as Severity
 from .findings.records import SourceFile as SourceFile
 from .findings.records import VerbResult as VerbResult
+from .findings.results import baseline_of as baseline_of
+from .findings.results import read_baseline as read_baseline
 from .findings.results import read_results as read_results
+from .findings.results import resolved_ids as resolved_ids
 from .findings.subject import AuditRows as AuditRows
 from .findings.subject import AuditView as AuditView
 from .findings.subject import Material as Material

@@ -61,28 +61,26 @@ def chosen_codes(select: Sequence[str] = (), skip: Sequence[str] = ()) -> set[st
     select, skip = as_names(select), as_names(skip)
     for text in (*select, *skip):
         if not text or not any(code.startswith(text) for code in CODES):
-            raise ValueError(
-                f"no code begins with {text!r}; {name_choice(text, [*CODES])}"
-            )
+            choice = name_choice(text, [*CODES])
+            raise ValueError(f"no code begins with {text!r}; {choice}")
     for text in skip:
         if text.startswith("FTD"):
             raise ValueError(
                 f"the code {text!r} cannot be left out: it reports what was declined"
             )
-    taken = select or ("FT",)
-    codes = {
+    reasons = {code for code in CODES if code.startswith("FTD")}
+    chosen = {
         code
         for code in CODES
-        if code.startswith("FTD")
-        or (code.startswith(taken) and not code.startswith(skip))
+        if code.startswith(select or ("FT",)) and not code.startswith(skip)
     }
-    if all(code.startswith("FTD") for code in codes):
+    if chosen <= reasons:
         raise ValueError("select and skip leave no code to answer")
-    return codes
+    return chosen | reasons
 
 
 def check_settings(settings: AuditSettings) -> None:
-    """Refuse settings outside their ranges."""
+    """Raise ValueError, in a sentence, if settings are outside their ranges."""
     for name, (high, allowed) in _RANGES.items():
         value = getattr(settings, name)
         if not 0.0 < value <= high:
@@ -94,19 +92,17 @@ def check_settings(settings: AuditSettings) -> None:
 
 
 def settings_with(settings: AuditSettings, texts: Mapping[str, str]) -> AuditSettings:
-    """Return settings with others for some names, as a user writes them.
-
-    The budget is not among them.
+    """Return settings with others, but the budget, as a user writes them.
 
     Example:
         >>> settings_with(AuditSettings(), {"epsilon": "0.2"}).epsilon
         0.2
     """
-    known = [name for name in (*_RANGES, *_COUNTS) if name != "budget"]
+    names = [name for name in (*_RANGES, *_COUNTS) if name != "budget"]
     values: dict[str, float] = {}
     for name, text in texts.items():
-        if name not in known:
-            raise ValueError(f"no setting {name!r}; {name_choice(name, known)}")
+        if name not in names:
+            raise ValueError(f"no setting {name!r}; {name_choice(name, names)}")
         try:
             values[name] = int(text) if name in _COUNTS else float(text)
         except ValueError:
@@ -210,25 +206,20 @@ def _wrong(bound: Configuration) -> Iterator[tuple[Path, str]]:
             check_settings(msgspec.structs.replace(AuditSettings(), **{name: value}))
         except ValueError as error:
             yield ("settings", name), str(error)
-    for position, fault in _wrong_limits(bound.limits):
-        yield ("limits", position), fault
+    names: set[str] = set()
+    for position, limits in enumerate(bound.limits):
+        place, low, high = ("limits", position), limits.from_, limits.to
+        if limits.variable in names:
+            yield place, f"{limits.variable!r} has limits already"
+        names.add(limits.variable)
+        if not (math.isfinite(low) and math.isfinite(high)):
+            yield place, f"limits must be finite, not {low!r} to {high!r}"
+        elif low > high:
+            swapped = f"limits are swapped: {low!r} to {high!r}"
+            yield place, f"{swapped}; the smaller one stands first"
     for key in ("select", "skip"):
         for position, text in enumerate(getattr(bound, key)):
             try:
                 chosen_codes([text])
             except ValueError as error:
                 yield (key, position), str(error)
-
-
-def _wrong_limits(limits: Sequence[LimitsOfFile]) -> Iterator[tuple[int, str]]:
-    """Yield the positions of limits that are none, and why."""
-    names: set[str] = set()
-    for position, one in enumerate(limits):
-        if one.variable in names:
-            yield position, f"{one.variable!r} has limits already"
-        names.add(one.variable)
-        if not (math.isfinite(one.from_) and math.isfinite(one.to)):
-            yield position, f"limits must be finite, not {one.from_!r} to {one.to!r}"
-        elif one.from_ > one.to:
-            swapped = f"limits are swapped: {one.from_!r} to {one.to!r}"
-            yield position, f"{swapped}; the smaller one stands first"

@@ -284,7 +284,11 @@ def _gaps(subject: Subject, first: Point) -> Iterator[AuditAnswer]:
     rows: list[tuple[Fraction, int]] = []
     if subject.rows is not None:
         variables = subject.rules.variables
-        rows = nearest_rows(boxes, subject.rows, subject.domain, variables)
+        known = [
+            sides or {name: (x, x) for name, x in point.values.items()}
+            for sides, point in zip(boxes, points, strict=True)
+        ]
+        rows = nearest_rows(known, subject.rows, subject.domain, variables)
         order.sort(key=lambda place: rows[place][0] if rows else 0)
     for number, place in enumerate(order, 1):
         state = _below(subject, points[place], Fraction(0), boxes[place])

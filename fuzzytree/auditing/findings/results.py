@@ -1,27 +1,78 @@
-"""Results of `check` and `stability` for the same model, named in an audit."""
+"""Files of earlier runs: accepted findings, and results of `check` and `stability`."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import os
-from collections.abc import Iterable
-from typing import NamedTuple
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final, Literal, NamedTuple
 
 import msgspec
 from msgspec import inspect
 
 from fuzzytree.auditing.findings.locations import writable
-from fuzzytree.auditing.findings.records import SourceFile, VerbResult
+from fuzzytree.auditing.findings.records import Audit, SourceFile, VerbResult
 from fuzzytree.checking import Stability
 from fuzzytree.errors import ReadError
 from fuzzytree.files import PathLike, read_bounded
 from fuzzytree.model import Agreement, Document, fingerprint, version
 
+FORMAT: Final = "fuzzytree-baseline/1"
+
 _MOST_BYTES = 64 * 2**20
 _KINDS: dict[str, type[Agreement] | type[Stability]] = {
     kind.FORMAT: kind for kind in (Agreement, Stability)
 }
+_ID = re.compile(r"FT[0-9D][0-9]{2}-[0-9a-f]{8}(-[1-9][0-9]*)?")
+
+
+# --- accepted findings
+
+
+class Baseline(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The sentences of accepted findings, which are for people, by their ids."""
+
+    format: Literal["fuzzytree-baseline/1"]
+    accepted: dict[str, str]
+
+
+def read_baseline(path: PathLike) -> Mapping[str, str]:
+    """Return the accepted findings' sentences by id; raise ReadError if it is none."""
+    lead = f"{os.fspath(path)}: is no baseline that --write-baseline wrote"
+    try:
+        content = read_bounded(path, _MOST_BYTES)
+        accepted = msgspec.json.decode(content, type=Baseline).accepted
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise ReadError(f"{lead}: {_quoted(error)}") from error
+    for name in accepted:
+        if not _ID.fullmatch(name):
+            raise ReadError(f"{lead}: {name[:40]!r} is no id of a finding")
+    return accepted
+
+
+def baseline_of(audit: Audit) -> bytes:
+    """Return the baseline that accepts every finding of an audit."""
+    accepted = {answer.id: answer.sentence for answer in audit.findings}
+    facts = {"format": FORMAT, "accepted": dict(sorted(accepted.items()))}
+    return (json.dumps(facts, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def resolved_ids(baseline: Mapping[str, str], audit: Audit) -> Iterator[str]:
+    """Yield the accepted ids that an audit no longer finds, in order.
+
+    Codes that were not run, or were cut short, are left out.
+    """
+    ids = {answer.id for answer in audit.findings}
+    unasked = {text.partition(" ")[0] for text in audit.unasked}
+    for name in sorted(baseline):
+        if name not in ids and name.partition("-")[0] not in unasked:
+            yield name
+
+
+# --- results of other verbs
 
 
 class LoadedResult(NamedTuple):
@@ -36,52 +87,43 @@ def read_results(
 ) -> tuple[LoadedResult, ...]:
     """Return what `fuzzytree check --json` and `stability --json` wrote of a model.
 
-    Args:
-        paths: Their files, at most one of each verb.
-        model: The model that they must be about.
+    ReadError is raised if a file is none of these, was changed by hand, is about
+    another model or of another version, or another file is of the same verb.
     """
     results: dict[str, LoadedResult] = {}
     for path in paths:
-        one = _read(path, model)
-        verb = one.result.verb
-        if verb in results:
+        name = os.fspath(path)
+        content = read_bounded(path, _MOST_BYTES)
+        record = _decoded(content, name)
+        file = SourceFile(writable(name), hashlib.sha256(content).hexdigest())
+        result = _result(record, file)
+        wanted = fingerprint(model)
+        if record.fingerprint != wanted:
             raise ReadError(
-                f"{os.fspath(path)}: is a result of {verb}, and so is "
-                f"{results[verb].result.file.name}; give one of them"
+                f"{name}: is a result of another model: its fingerprint is "
+                f"{record.fingerprint[:12]}..., and that of {model.name[:60]!r} is "
+                f"{wanted[:12]}...; run `fuzzytree {result.verb}` again"
             )
-        results[verb] = one
+        if result.verb in results:
+            raise ReadError(
+                f"{name}: is a result of {result.verb}, and so is "
+                f"{results[result.verb].result.file.name}; give one of them"
+            )
+        results[result.verb] = LoadedResult(result, record)
     return tuple(results.values())
-
-
-def _read(path: PathLike, model: Document) -> LoadedResult:
-    """Return one result; raise ReadError as `read_results` does."""
-    name = os.fspath(path)
-    content = read_bounded(path, _MOST_BYTES)
-    record = _decoded(content, name)
-    result = _result(
-        record, SourceFile(writable(name), hashlib.sha256(content).hexdigest())
-    )
-    wanted = fingerprint(model)
-    if record.fingerprint != wanted:
-        raise ReadError(
-            f"{name}: is a result of another model: its fingerprint is "
-            f"{record.fingerprint[:12]}..., and that of {model.name[:60]!r} is "
-            f"{wanted[:12]}...; run `fuzzytree {result.verb}` again"
-        )
-    return LoadedResult(result, record)
 
 
 def _result(record: Agreement | Stability, file: SourceFile) -> VerbResult:
     """Return the summary of a result."""
     if isinstance(record, Stability):
-        verdicts = [one.verdict for one in record.criteria]
+        verdicts = [criterion.verdict for criterion in record.criteria]
         return VerbResult("stability", file, len(verdicts), verdicts.count("FAILS"))
     count = len(record.comparisons) + len(record.certificates)
     return VerbResult("check", file, count, len(record.wrong))
 
 
 def _decoded(content: bytes, name: str) -> Agreement | Stability:
-    """Return the record in a file; raise ReadError if this version did not write it."""
+    """Return the record in a file, which must be as this version wrote it."""
     lead = f"{name}: is no result that `fuzzytree check` or `stability` --json wrote"
     try:
         facts = msgspec.json.decode(content, type=dict[str, object])
@@ -115,12 +157,12 @@ def _whole(facts: object, kind: inspect.Type) -> object:
         case inspect.FloatType() if facts is None:
             return math.inf
         case inspect.StructType(fields=fields) if isinstance(facts, dict):
-            known = {one.name: one.type for one in fields}
+            kinds = {field.name: field.type for field in fields}
             return {
-                key: _whole(value, known[key]) if key in known else value
+                key: _whole(value, kinds[key]) if key in kinds else value
                 for key, value in facts.items()
             }
         case inspect.VarTupleType(item_type=item) if isinstance(facts, list):
-            return [_whole(one, item) for one in facts]
+            return [_whole(fact, item) for fact in facts]
         case _:
             return facts

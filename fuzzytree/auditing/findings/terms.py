@@ -280,10 +280,8 @@ def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
 
 def _excesses(of: VariableRange, term: Term, shape: LR) -> Iterator[AuditAnswer | None]:
     """Yield where the polynomials of a set leave [0, 1] before they are clipped."""
-    mean, state = (
-        Fraction(shape.mean),
-        Computed("the polynomial was evaluated in fractions"),
-    )
+    mean = Fraction(shape.mean)
+    state = Computed("the polynomial was evaluated in fractions")
     for side, sign in ((shape.left, -1), (shape.right, 1)):
         spread = sign * Fraction(side.spread)
         low, high = sorted((mean, mean + spread))

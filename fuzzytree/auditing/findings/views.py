@@ -12,12 +12,12 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
-import msgspec
+from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.axes import function_lines
 from fuzzytree.auditing.decide.domain import Domain, DomainSide, span
 from fuzzytree.auditing.decide.lines import Hedged
-from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, rules_of
+from fuzzytree.auditing.decide.rules import LeftOut, rules_of
 from fuzzytree.auditing.decide.states import Declined, Proved
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Policy, TermName
@@ -48,18 +48,10 @@ from fuzzytree.semantics import as_rules, rules_from_tree, shape_of
 
 
 def view(model: Document, domain: Domain) -> AuditView:
-    """Return the rules of a model as they are audited.
+    """Return the rules of a model as they are audited on a domain.
 
-    Args:
-        model: A tree: its relative rules, which decide as it does. A rule base: itself.
-            A system: the rule base it stands for, or its conditions.
-        domain: The domain of the audit.
-
-    Example:
-        >>> from fuzzytree.testing import random_system
-        >>> rules = view(random_system(3), Domain(()))
-        >>> rules.policy.decision, rules.rules is None or len(rules.numbers) > 0
-        ('all', True)
+    Of a tree these are its relative rules, which decide as it does; of a system those
+    of the rule base that it stands for, or its conditions.
     """
     match model:
         case RuleBase():
@@ -67,12 +59,12 @@ def view(model: Document, domain: Domain) -> AuditView:
         case FuzzyTree():
             raw = rules_from_tree(model, "raw") if model.sets else None
             whole = _of_rules(rules_from_tree(model), domain)
-            return msgspec.structs.replace(whole, tree=model, raw=raw)
+            return replace(whole, tree=model, raw=raw)
         case FuzzySystem():
             rules = as_rules(model)
             if rules is None:
                 return _of_system(model, domain)
-            return msgspec.structs.replace(_of_rules(rules, domain), system=model)
+            return replace(_of_rules(rules, domain), system=model)
 
 
 def _of_rules(rules: RuleBase, domain: Domain) -> AuditView:
@@ -94,45 +86,43 @@ def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
         (v.name, t.name): shape
         for v in system.variables
         for t in v.terms
-        if not (v.parts and v.clips) and (shape := _shape(t)) is not None
+        if not _is_moved(v) and (shape := _shape(t)) is not None
     }
     curves = dict(_curves(system, sides, shapes))
     answers += _of_terms(system, shapes, curves, sides)
-    known = rules_of(system)
-    left, kept = [*known.left_out], list[BaseRule]()
-    for rule in known.rules:
+    every = rules_of(system)
+    left = {rule.number: rule for rule in every.left_out}
+    for rule in every.rules:
         if len(rule.literals) > 1 and rule.norm != conjunction:
             text = f"its 'and' is the {rule.norm}, and that of most rules is another"
             name = rule.name.partition(" of ")[2] if "way " in rule.name else rule.name
-            left.append(LeftOut(name, rule.number, "FTD01", text))
-    numbers = {one.number for one in left}
-    kept = [rule for rule in known.rules if rule.number not in numbers]
-    answers += (
-        _declined("FTD07", f"the activation of block {position}", why)
-        for position, block in enumerate(system.blocks, 1)
-        if block.activation.method != "general"
-        for why in [f"it is {block.activation.method!r}; only conditions are audited"]
-    )
-    once = {one.number: one for one in left}
-    answers += (_declined(one.code, one.name, one.reason) for one in once.values())
+            left[rule.number] = LeftOut(name, rule.number, "FTD01", text)
+    kept = [rule for rule in every.rules if rule.number not in left]
+    for position, block in enumerate(system.blocks, 1):
+        if block.activation.method != "general":
+            why = f"it is {block.activation.method!r}; only conditions are audited"
+            name = f"the activation of block {position}"
+            answers.append(_declined("FTD07", name, why))
+    answers += (_declined(one.code, one.name, one.reason) for one in left.values())
     proof = Proved("read off the rule; no input was needed")
     answers += (
-        audit_answer(f"FT101.{why}", name, proof) for name, _, why in known.silent
+        audit_answer(f"FT101.{why}", name, proof) for name, _, why in every.silent
     )
+    whens = [tuple(map(_readable, rule.when)) for rule in kept]
+    terms = dict.fromkeys(
+        (one.variable, term) for when in whens for one in when for term in one.terms
+    )
+    terms |= {(v.name, t.name): None for v in system.variables for t in v.terms}
     rules = None
-    asked = [one for rule in kept for one in map(_readable, rule.when)]
-    made = dict.fromkeys((one.variable, term) for one in asked for term in one.terms)
-    made |= {(v.name, t.name): None for v in system.variables for t in v.terms}
     if kept:
+        pairs = zip(whens, kept, strict=True)
         rules = RuleBase(
             system.name,
             tuple(dict.fromkeys(rule.then for rule in kept)),
-            tuple(_named(one, shapes, made) for one in system.variables),
-            tuple(Rule(tuple(map(_readable, rule.when)), rule.then) for rule in kept),
+            tuple(_named(one, shapes, terms) for one in system.variables),
+            tuple(Rule(when, rule.then) for when, rule in pairs),
             Semantics(conjunction),
         )
-    absent = [(one.name, one.number) for one in once.values()]
-    absent += [(name, number) for name, number, _ in known.silent]
     return AuditView(
         rules,
         tuple(kept),
@@ -142,10 +132,11 @@ def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
         rule_names=tuple(rule.name for rule in kept),
         numbers=tuple(rule.number for rule in kept),
         declined=tuple(answers),
-        left_out=dict(absent),
+        left_out={one.name: one.number for one in left.values()}
+        | {name: number for name, number, _ in every.silent},
         is_whole=not left,
         curves=curves,
-        inexact=frozenset(made.keys() - shapes.keys()),
+        inexact=frozenset(terms.keys() - shapes.keys()),
     )
 
 
@@ -165,27 +156,21 @@ def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[AuditAnsw
     sides: list[DomainSide] = []
     answers: list[AuditAnswer] = []
     for side in domain.sides:
-        one = clipped.get(side.variable)
-        low, high = side.low, side.high
-        if one is not None:
-            low, high = _moved(one, low), _moved(one, high)
+        ends = [side.low, side.high]
+        if variable := clipped.get(side.variable):
+            if variable.low is not None:
+                ends = [max(end, variable.low) for end in ends]
+            if variable.high is not None:
+                ends = [min(end, variable.high) for end in ends]
+        low, high = ends
         if (low, high) != (side.low, side.high):
-            answers.append(
-                _declined(
-                    "FTD07",
-                    f"input {side.variable!r}",
-                    f"values outside its range are moved to its ends, so its domain is "
-                    f"from {low!r} to {high!r}",
-                )
+            why = (
+                f"values outside its range are moved to its ends, so its domain is "
+                f"from {low!r} to {high!r}"
             )
-            side = msgspec.structs.replace(side, low=low, high=high)
-        sides.append(side)
+            answers.append(_declined("FTD07", f"input {side.variable!r}", why))
+        sides.append(replace(side, low=low, high=high))
     return Domain(tuple(sides)), answers
-
-
-def _moved(one: Variable, value: float) -> float:
-    value = value if one.low is None else max(value, one.low)
-    return value if one.high is None else min(value, one.high)
 
 
 def _declined(code: str, subject: str, reason: str) -> AuditAnswer:
@@ -205,12 +190,8 @@ def _shape(term: Term) -> Shape | None:
     if not isinstance(shape, Points):
         return None
     degrees = tuple(degree * term.height for degree in shape.degrees)
-    ratios = (float(a).as_integer_ratio() for a in (*shape.degrees, term.height))
-    *_, by = exact = [Fraction(*ratio) for ratio in ratios]
-    is_exact = all(
-        Fraction(d) == own * by for d, own in zip(degrees, exact[:-1], strict=True)
-    )
-    return Points(shape.values, degrees) if is_exact else None
+    exact = [Fraction(degree) * Fraction(term.height) for degree in shape.degrees]
+    return Points(shape.values, degrees) if [*map(Fraction, degrees)] == exact else None
 
 
 def _readable(one: Proposition) -> Proposition:
@@ -234,18 +215,22 @@ def _curves(
     system: FuzzySystem, domain: Domain, shapes: dict[Name, Shape]
 ) -> Iterator[tuple[Name, MembershipFunction]]:
     """Yield the functions of terms that lines enclose, and that are none."""
-    for one in system.variables:
-        names = [part.input for part in one.parts] or [one.name]
-        if any(domain.side(name) is None for name in names) or (
-            one.parts and one.clips
-        ):
+    for variable in system.variables:
+        names = [part.input for part in variable.parts] or [variable.name]
+        if any(domain.side(name) is None for name in names) or _is_moved(variable):
             continue
-        for term in one.terms:
+        for term in variable.terms:
             shape = shape_of(term.function)
             is_wrong = shape is not None and any(shape.mistakes())
             is_free = isinstance(term.function, Formula | Linear) or is_wrong
-            if (one.name, term.name) not in shapes and not is_free:
-                yield (one.name, term.name), Hedged(term.function, term.height, ())
+            if (variable.name, term.name) not in shapes and not is_free:
+                function = Hedged(term.function, term.height, ())
+                yield (variable.name, term.name), function
+
+
+def _is_moved(variable: Variable) -> bool:
+    """Return whether a combination is moved into a range."""
+    return bool(variable.parts and variable.clips)
 
 
 def _of_terms(
@@ -260,30 +245,27 @@ def _of_terms(
         for rule in system.rules
         for key in {(one.variable, one.term) for one in questions(rule.when)}
     )
-    for one in system.variables:
-        for term in one.terms:
-            key = one.name, term.name
-            if key in shapes:
-                continue
-            message, facts = "FTD.left-out", dict[str, float]()
-            reason = f"its curve ({term.function.__struct_config__.tag}) has no exact"
-            reason += " method"
-            if one.parts and one.clips:
-                reason = "a combination that is moved into a range has no exact method"
-            if key in curves:
-                message = "FTD.bounded"
-                reason += "; its shape and its overlaps are not checked"
-                both = function_lines(curves[key], *span(one, domain))
-                pairs = zip(both.lower.at, both.upper.at, strict=True)
-                apart = max((high - low for low, high in pairs), default=Fraction(0))
-                facts = {"apart": outwards(apart)[1]}
-            count = uses[key]
-            few = {0: "no rule uses it", 1: "1 rule uses it"}
-            reason += f"; {few.get(count, f'{count} rules use it')}"
-            yield audit_answer(
-                message,
-                f"term {term.name!r} of {one.name!r}",
-                Declined("FTD02", reason),
-                terms=(TermName(*key),),
-                facts=facts,
-            )
+    every = [
+        (variable, term) for variable in system.variables for term in variable.terms
+    ]
+    for variable, term in every:
+        key = variable.name, term.name
+        if key in shapes:
+            continue
+        message, facts = "FTD.left-out", dict[str, float]()
+        tag = term.function.__struct_config__.tag
+        reason = f"its curve ({tag}) has no exact method"
+        if _is_moved(variable):
+            reason = "a combination that is moved into a range has no exact method"
+        if key in curves:
+            message = "FTD.bounded"
+            reason += "; its shape and its overlaps are not checked"
+            both = function_lines(curves[key], *span(variable, domain))
+            pairs = zip(both.lower.at, both.upper.at, strict=True)
+            apart = max((high - low for low, high in pairs), default=Fraction(0))
+            facts = {"apart": outwards(apart)[1]}
+        few = {0: "no rule uses it", 1: "1 rule uses it"}
+        reason += f"; {few.get(uses[key], f'{uses[key]} rules use it')}"
+        title, state = f"term {term.name!r} of {key[0]!r}", Declined("FTD02", reason)
+        names = (TermName(*key),)
+        yield audit_answer(message, title, state, terms=names, facts=facts)

@@ -9,11 +9,6 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.baselines import (
-    baseline_of,
-    read_baseline,
-    resolved_ids,
-)
 from fuzzytree.auditing.findings.configuration import (
     Configuration,
     LimitsOfFile,
@@ -22,6 +17,11 @@ from fuzzytree.auditing.findings.configuration import (
     read_configuration,
 )
 from fuzzytree.auditing.findings.records import Audit, AuditSelection, AuditSettings
+from fuzzytree.auditing.findings.results import (
+    baseline_of,
+    read_baseline,
+    resolved_ids,
+)
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.errors import ReadError
 from tests.cli.conftest import grip

@@ -123,7 +123,7 @@ def test_a_term_of_a_combination_is_tested_on_all_its_inputs_allow() -> None:
     [
         (
             LR(2.0, Half(1.0, (3.0,), 1.5), Half(1.0, (0.5,), 1.5)),
-            "is clipped: its polynomial goes 2 below 0 between 1 and 1.667",
+            "is clipped: its polynomial goes 2 below 0 between 1 and 1.668",
         ),
         (
             Points((0.0, 1.0, 2.0, 3.0, 4.0), (0.0, 1.0, 0.25, 0.5, 0.0)),
