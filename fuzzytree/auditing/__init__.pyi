@@ -60,7 +60,7 @@ from .findings.views import view as view
 from .require.claims import Compliance as Compliance
 from .require.claims import Requirement as Requirement
 from .require.claims import RequirementAnswer as RequirementAnswer
-from .require.files import read_requirements as read_requirements
 from .require.phrases import parse_requirement as parse_requirement
+from .require.phrases import read_requirements as read_requirements
 from .require.requirements import STEPS as STEPS
 from .require.requirements import comply as comply

@@ -70,11 +70,7 @@ class RequirementAnswer(Value, frozen=True):
     """What is known of one requirement.
 
     Attributes:
-        requirement: The sentence.
-        name: What its author calls it.
-        why: The reason for it.
         line: Where it stands in its file, from 1; 0 without one.
-        column: The same.
         verdict: `PROVED`: true for every row. `REFUTED`: not for the rows below.
         sentence: How it is proved, what the rows show, or why it is open.
         bound: Of an open one, the nearest number that is proved in place of its own.
@@ -98,16 +94,11 @@ class Compliance(Value, frozen=True):
     """Which requirements a model meets.
 
     Attributes:
-        version: Of fuzzytree.
         model: The file of the model, or what the model calls itself.
         fingerprint: The SHA-256 of its content.
         source: The file of the requirements; "" without one.
         steps: The budget of each question.
         answers: One for each requirement, in order.
-
-    Example:
-        >>> Compliance("1", "grip", "", "", 1, ()).ok
-        True
     """
 
     version: str

@@ -1,6 +1,14 @@
 """Sentences of requirements, such as `tip rises with service where food >= 5`.
 
-Names that contain words of the grammar stand in quotes.
+Names that contain words of the grammar stand in quotes. A YAML file has many sentences:
+
+```yaml
+requirements:
+  - that: class is never firm
+    where: force < 2
+    name: gentle
+    why: Eggs break.
+```
 """
 
 from __future__ import annotations
@@ -9,7 +17,9 @@ import itertools
 import math
 import re
 from collections.abc import Collection
-from typing import Final
+from typing import Annotated, ClassVar, Final
+
+from msgspec import Meta
 
 from fuzzytree.auditing.findings.table_words import read_value
 from fuzzytree.auditing.require.claims import (
@@ -22,9 +32,13 @@ from fuzzytree.auditing.require.claims import (
     UnchangedClaim,
 )
 from fuzzytree.cells import number_of
+from fuzzytree.files import PathLike, read_bounded
+from fuzzytree.formats import FileRecord, bind, compose, find, report
 from fuzzytree.model import Document, FuzzySystem, Variable, name_choice
 
 _MOST_BOXES = 256
+_MOST_BYTES = 2**20
+_Sentence = Annotated[str, Meta(min_length=1, max_length=1000)]
 _CONDITION = re.compile(
     r"\s*(?P<name>'[^']+'|\"[^\"]+\"|[^<>=]+?)\s*"
     r"(?:(?P<sign><=|>=|<|>)\s*(?P<end>.+?)"
@@ -66,11 +80,8 @@ _ALL: Final[_Spans] = ((-math.inf, math.inf),)
 def parse_requirement(text: str, model: Document, where: str = "") -> Requirement:
     """Return the requirement that a sentence states about a model.
 
-    Args:
-        text: `CLAIM`, `CLAIM where CONDITION and CONDITION`, or `if CONDITION then
-            CLAIM`.
-        model: The model.
-        where: More conditions.
+    It reads `CLAIM`, `CLAIM where CONDITION and CONDITION`, or `if CONDITION then
+    CLAIM`; `where` has more conditions. A ValueError says what is wrong.
 
     Example:
         >>> from fuzzytree.testing import random_system
@@ -150,10 +161,10 @@ def _condition(match: re.Match[str], variable: Variable) -> _Spans:
 
 
 def _ordered(low: float, high: float, match: re.Match[str]) -> tuple[float, float]:
-    if low > high:
-        ends = f"the ends {match['low']} and {match['high']} are swapped"
-        raise ValueError(f"{ends}; the smaller one stands first")
-    return low, high
+    if low <= high:
+        return low, high
+    ends = f"the ends {match['low']} and {match['high']} are swapped"
+    raise ValueError(f"{ends}; the smaller one stands first")
 
 
 # --- names and numbers
@@ -248,3 +259,44 @@ def _output_claim(match: re.Match[str], system: FuzzySystem) -> Claim:
     else:
         high = _number(words.get("end", "0"))
     return NumberClaim(output, low, high, name)
+
+
+# --- files
+
+
+class RequirementOfFile(FileRecord, frozen=True, kw_only=True):
+    """A sentence, `that`, which must be true for all rows that meet `where`."""
+
+    noun: ClassVar[str] = "a requirement"
+    that: _Sentence
+    where: _Sentence | None = None
+    name: _Sentence | None = None
+    why: _Sentence | None = None
+
+
+class RequirementsFile(FileRecord, frozen=True, kw_only=True):
+    """Requirements of a model, which `fuzzytree require` proves or refutes."""
+
+    noun: ClassVar[str] = "a file of requirements"
+    requirements: Annotated[
+        tuple[RequirementOfFile, ...], Meta(min_length=1, max_length=1000)
+    ]
+
+
+def read_requirements(path: PathLike, model: Document) -> tuple[Requirement, ...]:
+    """Return the requirements of a file about a model."""
+    root, mistakes = compose(read_bounded(path, _MOST_BYTES), str(path))
+    record = bind(root, RequirementsFile, mistakes)
+    results: list[Requirement] = []
+    for position, entry in enumerate(record.requirements if record else ()):
+        node = find(root, ("requirements", position, "that"))
+        try:
+            requirement = parse_requirement(entry.that, model, entry.where or "")
+        except ValueError as error:
+            mistakes.append((node.line, node.column, str(error)))
+            continue
+        requirement = requirement._replace(name=entry.name or "", why=entry.why or "")
+        results.append(requirement._replace(line=node.line, column=node.column))
+    if mistakes:
+        raise report(str(path), mistakes)
+    return tuple(results)

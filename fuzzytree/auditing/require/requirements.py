@@ -6,36 +6,24 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.decide import NotBoundedError, scale_of
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.require.claims import (
     Box,
     Claim,
-    ClassClaim,
     Compliance,
-    CoveredClaim,
-    NumberClaim,
-    OrderClaim,
     Requirement,
     RequirementAnswer,
-    UnchangedClaim,
 )
-from fuzzytree.auditing.require.classes import (
-    class_outcome,
-    order_outcome,
-    unchanged_outcome,
+from fuzzytree.auditing.require.outcomes import outcome_of
+from fuzzytree.auditing.require.search import (
+    Outcome,
+    Search,
+    prediction_texts,
+    rows_text,
 )
-from fuzzytree.auditing.require.numbers import (
-    ROUNDING,
-    covered_outcome,
-    number_outcome,
-)
-from fuzzytree.auditing.require.search import Outcome, Search
-from fuzzytree.auditing.require.tables import prediction_texts, rows_text
-from fuzzytree.model import Document, FuzzySystem, Variable, fingerprint, version
+from fuzzytree.model import Document, Variable, fingerprint, version
 
 STEPS: Final = 4_000_000
 """The budget of each question of a requirement; a step is about a microsecond."""
@@ -52,24 +40,19 @@ def comply(
 ) -> Compliance:
     """Return which requirements a model meets.
 
-    Args:
-        model: The model.
-        requirements: What it must do.
-        domain: The rows that the conditions of each requirement choose from.
-        steps: The budget of each question.
-        title: The file of the model, if it has one.
-        source: The file of the requirements.
+    `domain` has the rows that the conditions of each requirement choose from, `steps`
+    is the budget of each question; `title` and `source` name the files, if any.
     """
     if steps < 1:
         raise ValueError(f"the budget must be 1 step or more, not {steps}")
-    boxes = [
-        [_part(model, domain, requirement, box) for box in requirement.boxes]
+    pairs = [
+        (
+            requirement,
+            [_part(model, domain, requirement, box) for box in requirement.boxes],
+        )
         for requirement in requirements
     ]
-    answers = tuple(
-        _answer(model, requirement, parts, steps)
-        for requirement, parts in zip(requirements, boxes, strict=True)
-    )
+    answers = tuple(_answer(model, of, boxes, steps) for of, boxes in pairs)
     title = title or model.name
     return Compliance(version(), title, fingerprint(model), source, steps, answers)
 
@@ -80,7 +63,8 @@ def _answer(
     """Return what is known of a requirement, by its worst box."""
     worst = Outcome("PROVED", "")
     for box in boxes:
-        outcome = _outcome(model, requirement.claim, box, steps)
+        search = Search(model, _without_missing(box, requirement.claim), steps)
+        outcome = outcome_of(requirement.claim, search)
         if worst.verdict == "PROVED" or outcome.verdict == "REFUTED":
             worst = outcome
         if worst.verdict == "REFUTED":
@@ -100,34 +84,14 @@ def _answer(
     )
 
 
-def _outcome(model: Document, claim: Claim, domain: Domain, steps: int) -> Outcome:
-    if name := getattr(claim, "input", ""):  # a missing value has no place in it
-        sides = (
-            replace(side, missing=None) if side.variable == name else side
-            for side in domain.sides
-        )
-        domain = Domain(tuple(sides))
-    search = Search(model, domain, steps)
-    try:
-        if isinstance(claim, UnchangedClaim):
-            scales = [0.5]  # of the position of a class
-            if isinstance(model, FuzzySystem):
-                scales = [scale_of(model, output.name) for output in model.outputs]
-            allowed = ROUNDING * np.array(scales)
-            return unchanged_outcome(search, claim.columns, allowed)
-        match claim, model:
-            case ClassClaim(labels=labels), _:
-                return class_outcome(search, labels)
-            case OrderClaim(), _:
-                return order_outcome(search, claim)
-            case CoveredClaim(), FuzzySystem():
-                return covered_outcome(search, model)
-            case NumberClaim(), FuzzySystem():
-                return number_outcome(search, model, claim)
-            case _:
-                raise TypeError(f"{claim} is a claim about a fuzzy system")
-    except NotBoundedError as error:
-        return Outcome("OPEN", str(error))
+def _without_missing(domain: Domain, claim: Claim) -> Domain:
+    """Return a domain in which an input that rises has no missing value."""
+    name = getattr(claim, "input", "")
+    sides = (
+        replace(side, missing=None) if side.variable == name else side
+        for side in domain.sides
+    )
+    return Domain(tuple(sides))
 
 
 def _part(model: Document, domain: Domain, of: Requirement, box: Box) -> Domain:

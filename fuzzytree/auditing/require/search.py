@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import datetime
+import io
 import math
 from collections.abc import Callable, Collection, Mapping
 from fractions import Fraction
@@ -21,7 +24,14 @@ from fuzzytree.auditing.decide import (
 )
 from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.require.claims import Verdict
-from fuzzytree.model import Document, FloatArray, FuzzySystem, FuzzyTree
+from fuzzytree.model import (
+    DATE_UNIT,
+    Document,
+    FloatArray,
+    FuzzySystem,
+    FuzzyTree,
+    Variable,
+)
 from fuzzytree.runtimes import baseline, run_system
 
 _NEAR = 1024  # rows drawn near the worst of them
@@ -68,13 +78,9 @@ class Search:
         proof: str,
         loss: Loss | None = None,
     ) -> Outcome:
-        """Return whether no question has a point.
+        """Return whether no question has a point, as a proof or a doubt.
 
-        Args:
-            questions: The questions.
-            doubt: What a point shows.
-            proof: What is proved if there is none.
-            loss: Whether the row nearest to a point refutes the claim; by default none.
+        `loss` says whether the row nearest to a point refutes the claim.
         """
         answers = [self.ask(question) for question in questions]
         for answer in answers:
@@ -105,10 +111,7 @@ class Search:
     def worst(self, loss: Loss, changes: Collection[str] = ()) -> Rows | None:
         """Return the try that refutes a claim most, None if none does.
 
-        Args:
-            loss: The claim.
-            changes: Inputs in which two rows of a try differ, and in no other; a single
-                input rises.
+        Two rows of a try differ in `changes` and no other input; a single one rises.
         """
         random = np.random.default_rng(0)
         axes, places = self._axes, [*map(self.model.inputs.index, changes)]
@@ -184,3 +187,43 @@ def predictor(model: Document) -> Callable[[FloatArray], FloatArray]:
     places = [*model.classes, None]
     codes = np.array([float(places.index(label)) for label in labels])
     return lambda rows: codes[run(rows).rule][None]
+
+
+# --- rows in the words of a table
+
+
+def prediction_texts(model: Document, rows: Rows) -> tuple[str, ...]:
+    """Return the predictions of the rows of a try in words."""
+    results = predictor(model)(rows[..., 0]).T.tolist()
+    if not isinstance(model, FuzzySystem):
+        labels = (*model.classes, "no class")
+        return tuple(labels[int(code)] for (code,) in results)
+    return tuple(
+        ", ".join(
+            f"{output.name} {'no number' if math.isnan(number) else repr(number)}"
+            for output, number in zip(model.outputs, numbers, strict=True)
+        )
+        for numbers in results
+    )
+
+
+def rows_text(model: Document, rows: Rows) -> str:
+    """Return the rows of a try as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    variables = [variable for variable in model.variables if not variable.parts]
+    writer.writerow(variable.name for variable in variables)
+    for row in rows[..., 0].T.tolist():
+        writer.writerow(map(_cell_text, variables, row))
+    return text.getvalue()
+
+
+def _cell_text(variable: Variable, value: float) -> str:
+    """Return a value of an input as a table has it."""
+    if variable.categories:
+        is_code = value in range(len(variable.categories))
+        return variable.categories[int(value)] if is_code else ""
+    if variable.unit == DATE_UNIT and value.is_integer():
+        start = datetime.date(1970, 1, 1)
+        return (start + datetime.timedelta(days=value)).isoformat()
+    return repr(value).removesuffix(".0")

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.auditing.require.files import read_requirements
-from fuzzytree.auditing.require.phrases import parse_requirement
+from fuzzytree.auditing.require.phrases import parse_requirement, read_requirements
 from fuzzytree.errors import ReadError
 from fuzzytree.model import (
     DATE_UNIT,
