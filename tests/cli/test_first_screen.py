@@ -32,7 +32,7 @@ FIRST_LINES = {
     "run wine.yaml t.csv --why -o p.csv": "predicted 178 rows barbera 49, barolo",
     "check wine.yaml": "wine: none of 79 comparisons disagrees (238 ",
     "check wine.yaml bad.yaml": "wine: 2 of 81 comparisons disagree (238 ",
-    "audit wine.yaml": "nothing found; 56 questions, ",
+    "audit wine.yaml": "nothing found; 30 questions, ",
     "audit wine.yaml --data t.csv --target cultivar": "1 finding: 1 note; ",
     "require wine.yaml --that every__input__gets__a__class": (
         "wine.yaml: 1 requirement: 1 proved"

@@ -27,6 +27,7 @@ from fuzzytree.auditing.findings.codes import (
 from fuzzytree.auditing.findings.configuration import check_settings, chosen_codes
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.locations import (
+    ModelFile,
     locations_of,
     with_ids,
     writable,
@@ -63,8 +64,9 @@ from fuzzytree.rechecking import (
 )
 
 _BY_CONSTRUCTION = "not asked where true by construction of relative rules"
-_OF_RAW_RULES = "FT203"
 _RAW = "not asked, as raw rules are another model; --select FT203 compares them"
+_RUNTIMES = "not asked, as `fuzzytree check` compares runtimes; --select FT6 asks"
+_ON_REQUEST = {"FT203": _RAW, "FT601": _RUNTIMES, "FT602": _RUNTIMES}
 _LATE = "FTD03"
 _TOO_LARGE = "it needs more memory than there is"
 
@@ -109,14 +111,15 @@ def audit(
     reasons: dict[str, str] = {}
     if viewed.rules is not None and viewed.rules.kind == "relative":
         reasons = dict.fromkeys(wanted & ANSWERED_BY_CONSTRUCTION, _BY_CONSTRUCTION)
-    if viewed.raw is not None and not selection.select:
-        reasons |= dict.fromkeys(wanted & {_OF_RAW_RULES}, _RAW)
+    left = {} if selection.select else dict(_ON_REQUEST)
+    if viewed.raw is None:
+        left.pop("FT203", None)
+    reasons |= {code: why for code, why in left.items() if code in wanted}
     answers, cut = [*viewed.declined], dict[str, str]()
     if viewed.rules is not None:
         budget = Budget(int(settings.budget * 1e6), report=report)
         subject = subject_of(viewed, settings, budget, rows, row)
-        asked = {code for code in wanted if reasons.get(code) != _RAW}
-        _answer_all(subject, asked, answers, cut)
+        _answer_all(subject, wanted - left.keys(), answers, cut)
     is_plain = [*viewed.numbers] == [*range(1, len(viewed.numbers) + 1)]
     words = Words(viewed.domain, model.variables)
     kept = sorted((a for a in answers if a.code in wanted), key=lambda a: a.code)
@@ -142,8 +145,9 @@ def audit(
     # A count among doubles is a double from here on, as it is for who reads the file.
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
     subject_model = _audited(viewed, model)
+    own_file = file if subject_model is model else None
     confirmed = with_confirmations(
-        result.answers, lambda: confirm(*_for_solver(result, subject_model))
+        result.answers, lambda: confirm(*_for_solver(result, subject_model, own_file))
     )
     result = replace(result, answers=confirmed)
     ids = {answer.id for answer in result.findings}
@@ -168,11 +172,15 @@ def _audited(viewed: AuditView, model: Document) -> Document:
     return viewed.rules if is_class and viewed.rules is not None else model
 
 
-def _for_solver(result: Audit, model: Document) -> tuple[bytes, bytes]:
-    """Return an audit without places, and its model written anew."""
-    moved = (replace(one, places=()) for one in result.answers)
-    bare = replace(result, file=None, answers=tuple(moved))
-    return msgspec.json.encode(bare), find_format("yaml").write(model).content
+def _for_solver(
+    result: Audit, model: Document, file: ModelFile | None = None
+) -> tuple[bytes, bytes]:
+    """Return an audit without places, and its model: its YAML, or written anew."""
+    moved = (replace(answer, places=()) for answer in result.answers)
+    bare = msgspec.json.encode(replace(result, file=None, answers=tuple(moved)))
+    if file is not None and file.name.endswith((".yaml", ".yml")):
+        return bare, file.content
+    return bare, find_format("yaml").write(model).content
 
 
 def with_confirmations(
