@@ -1,28 +1,19 @@
 """The findings of an audit: one module for each family of questions.
 
-In reading order:
-
 An audit
-    - `records`: an audit, its answers and settings, as frozen values
-    - `codes`: every question and reason, and the families that answer them
-    - `subject`: the model and the settings, as each family receives them
+    - `records`: an audit, its answers and settings; `codes`: every question and reason
+    - `subject`, `views`: the model and its rules, as each family receives them
     - `audit`: runs all families within the budget
-    - `domains`, `views`: the domain; the rules of a model as an audit sees them
-    - `table_words`: values of inputs as their table has them, shown and read
+    - `domains`, `table_words`: where rows lie, in the words of their table
     - `locations`: where rules stand in a file; ids that do not depend on their order
-    - `results`, `baselines`, `configuration`: results of other verbs, accepted findings
-      and settings, from files
+    - `configuration`, `results`: settings, accepted findings, results of other verbs
 
 Families
-    - `deciding`: does a rule ever win, by how much, does it tie
-    - `gaps`: inputs that no rule covers, or none covers well
-    - `pairs`, `propositions`: two rules that hide, copy or contradict each other;
-      propositions without effect
-    - `terms`: terms that are not reached or not used, ill shaped, hard to distinguish
-    - `complexity`: counts, and the index of Nauck
-    - `leaves`: where each leaf of a tree decides
-    - `robustness`, `rows`: how far a row is from another decision
-    - `disagreement`: where a tree and its raw rules differ, and how near to rows
+    - `deciding`: does a rule ever win, by how much, does it tie; is every input covered
+    - `pairs`: rules that hide, copy or contradict each other; propositions to no effect
+    - `terms`: terms that are not reached, ill shaped or hard to distinguish; counts
+    - `leaves`: where each leaf of a tree decides, and where its raw rules differ
+    - `robustness`: how far rows are from another decision, and from gaps
     - `support`: what rows show; shares of the domain
-    - `representations`, `conventions`: do all representations and runtimes agree
+    - `representations`: do all representations and runtimes agree
 """

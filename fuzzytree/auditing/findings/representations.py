@@ -8,7 +8,6 @@ certificate bounds what a number type can change on all of the domain.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from fractions import Fraction
 from typing import TYPE_CHECKING, Final, NamedTuple, cast
 
 import numpy as np
@@ -17,13 +16,9 @@ from msgspec.structs import replace
 from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.decide.states import (
     Bracket,
-    Claim,
     Computed,
     Declined,
-    Representation,
     State,
-    Witness,
-    coordinates,
 )
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
@@ -39,11 +34,10 @@ from fuzzytree.model import (
     Certified,
     Comparison,
     Dtype,
-    FuzzyTree,
     Model,
     Variable,
 )
-from fuzzytree.numerics import TIE, certify, decide, exact_answer
+from fuzzytree.numerics import TIE, certify, decide
 from fuzzytree.runtimes import all_runtimes
 from fuzzytree.semantics import forms, probe_values
 
@@ -73,19 +67,19 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     subject.budget.check()
     values, how = _rows(subject)
     result = agreement(subject, values)
-    yield from agreement_answers(subject, result)
+    yield from agreement_answers(result.agreement)
     yield from convention_answers(subject, result)
+    models = {}
+    if subject.system is None:
+        models = {str(name): form for name, form in forms(_model(subject)).items()}
     for certified in result.agreement.certificates:
         subject.budget.check()
-        name = certified.representation.rpartition(" in ")[0]
-        yield from _certified(subject, certified, _forms(subject)[name], how)
+        form = models[certified.representation.rpartition(" in ")[0]]
+        yield from _certified(subject, certified, form, how)
 
 
-def _forms(subject: Subject) -> dict[str, Model]:
-    if subject.system is not None:
-        return {}
-    model = subject.tree or subject.rules
-    return {str(name): form for name, form in forms(model).items()}
+def _model(subject: Subject) -> Model:
+    return subject.tree or subject.rules
 
 
 def _rows(subject: Subject) -> tuple[FloatArray, str]:
@@ -110,7 +104,7 @@ def agreement(
 
     Special values of a system stand behind its rows, those of rules among the probes.
     """
-    system, model = subject.system, subject.tree or subject.rules
+    system, model = subject.system, _model(subject)
     names = [
         runtime.name
         for runtime in all_runtimes()
@@ -128,12 +122,12 @@ def agreement(
 # --- FT601: is there a disagreement?
 
 
-def agreement_answers(subject: Subject, result: Result) -> Iterator[AuditAnswer]:
+def agreement_answers(result: Agreement) -> Iterator[AuditAnswer]:
     """Yield an answer for each disagreement of a check, and a summary of the rest."""
     clean: dict[str, list[Comparison]] = {}
-    for compared in result.agreement.comparisons:
+    for compared in result.comparisons:
         if compared.verdict in ("DISAGREES", "rows only"):
-            yield _disagreement(subject, compared, result)
+            yield _disagreement(compared)
         elif compared.verdict == "agrees":  # raw rules differ by design: FT203
             is_proof = compared.basis in ("file", "all cells")
             title = "proof" if is_proof else str(compared.basis)
@@ -149,15 +143,13 @@ def agreement_answers(subject: Subject, result: Result) -> Iterator[AuditAnswer]
             f"representations, by {title}",
         )
         yield audit_answer(message, name, Computed("; ".join(parts)), facts=facts)
-    for text in result.agreement.skipped:
+    for text in result.skipped:
         if not text.startswith("all cells"):  # a proof covers them
             name = text.partition(" is not installed")[0].partition(": ")[0]
             yield audit_answer("FT601.not-compared", name, Declined("FTD08", text))
 
 
-def _disagreement(
-    subject: Subject, compared: Comparison, result: Result
-) -> AuditAnswer:
+def _disagreement(compared: Comparison) -> AuditAnswer:
     detail = "; ".join(compared.detail[:2])
     facts = {
         "against": compared.against,
@@ -168,36 +160,12 @@ def _disagreement(
     return audit_answer(
         "FT601.disagrees",
         compared.representation,
-        witness(subject, compared, result)
-        or Computed(f"both were run or read; {detail}"),
+        Computed(f"both were run or read; {detail}"),
         Measure("rows that differ", compared.differing),
         Measure("rows of another class", compared.flips),
         Measure("largest difference", compared.largest_difference),
         facts=facts,
     )
-
-
-def witness(subject: Subject, compared: Comparison, result: Result) -> Witness | None:
-    """Return the first differing row in the domain, with the answer of a form."""
-    known = _forms(subject)
-    name = compared.representation.rpartition(": ")[2]
-    form = known.get(name) or next(iter(known.values()), None)
-    rows = [row for row in compared.row_numbers if row < result.values.shape[1]]
-    values = result.values[:, rows]
-    inside = ~rows_outside(subject.rules, subject.domain, values)
-    inside &= np.isfinite(values).all(axis=0)
-    if form is None or not inside.any():
-        return None
-    row = values[:, int(np.argmax(inside))].tolist()
-    point = dict(zip(form.inputs, row, strict=True))
-    of: Representation = "rules"
-    if isinstance(form, FuzzyTree):
-        of = "tree"
-    elif form.kind == "raw" and subject.tree is not None:
-        of = "raw rules"
-    claim = Claim("decides", of=of, label=exact_answer(form, point).label)
-    exact = {name: Fraction(x) for name, x in point.items()}
-    return Witness(coordinates(exact), (claim,))
 
 
 # --- FT602: do they agree where runtimes usually differ?
@@ -218,18 +186,11 @@ def convention_answers(subject: Subject, result: Result) -> Iterator[AuditAnswer
             if compared.verdict == "DISAGREES" and faults:
                 is_broken = True
                 title, against = compared.representation, compared.against
-                state: State = Computed(f"both were run; {faults[-1]}")
-                yield audit_answer(
-                    "FT602.differs",
-                    f"{convention}, {title}",
-                    witness(subject, compared, result) or state,
-                    facts={
-                        "convention": convention,
-                        "representation": title,
-                        "against": against,
-                        "detail": faults[-1],
-                    },
-                )
+                facts = {"representation": title, "against": against}
+                facts |= {"convention": convention, "detail": faults[-1]}
+                state = Computed(f"both were run; {faults[-1]}")
+                name = f"{convention}, {title}"
+                yield audit_answer("FT602.differs", name, state, facts=facts)
         if not is_broken:
             state = Computed(f"each generated row was answered by {', '.join(names)}")
             message = "FT602.alike" if rows else "FT602.none"
