@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -48,20 +47,8 @@ from fuzzytree.auditing.findings.table_words import Words
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters import find_format
-from fuzzytree.model import (
-    Document,
-    FuzzyTree,
-    RuleBase,
-    fingerprint,
-    name_choice,
-    version,
-)
-from fuzzytree.rechecking import (
-    CannotRunError,
-    Report,
-    claims_text,
-    confirm,
-)
+from fuzzytree.model import Document, fingerprint, kind_of, name_choice, version
+from fuzzytree.rechecking import CannotRunError, Report, claims_text, confirm
 
 _BY_CONSTRUCTION = "not asked where true by construction of relative rules"
 _RAW = "not asked, as raw rules are another model; --select FT203 compares them"
@@ -120,6 +107,7 @@ def audit(
         budget = Budget(int(settings.budget * 1e6), report=report)
         subject = subject_of(viewed, settings, budget, rows, row)
         _answer_all(subject, wanted - left.keys(), answers, cut)
+    kind = getattr(model, "kind", None) or ""
     is_plain = [*viewed.numbers] == [*range(1, len(viewed.numbers) + 1)]
     words = Words(viewed.domain, model.variables)
     kept = sorted((a for a in answers if a.code in wanted), key=lambda a: a.code)
@@ -127,7 +115,7 @@ def audit(
     result = Audit(
         version=version(),
         model=model.name,
-        form=_form(model),
+        form=f"{kind} {kind_of(model)}".lstrip(),
         fingerprint=fingerprint(model),
         file=source_of(file.name, file.content) if file else None,
         data=material.data,
@@ -238,7 +226,7 @@ def source_of(name: str, content: bytes) -> SourceFile:
 
 def _answer_all(
     subject: Subject,
-    wanted: Collection[str],
+    wanted: set[str],
     answers: list[AuditAnswer],
     cut: dict[str, str],
 ) -> None:
@@ -247,43 +235,39 @@ def _answer_all(
     `cut` gets the codes that were cut short or not begun, and why.
     """
     spent = f"the budget of {subject.settings.budget:g} million steps is spent"
-    codes = [[c for c in family.codes if c in wanted] for family in FAMILIES]
-    for number, family in enumerate(FAMILIES):
-        if not codes[number]:
-            continue
+    chosen = [(family, wanted & {*family.codes}) for family in FAMILIES]
+    chosen = [(family, codes) for family, codes in chosen if codes]
+    for number, (family, codes) in enumerate(chosen, 1):
         try:
             subject.budget.check()
-            own = _budget_part(subject, number, family.part)
-            own.report(CODES[codes[number][0]].title, 0.0)
-            for answer in family_function(family)(replace(subject, budget=own)):
+            part = 1.0 if number == len(chosen) else family.part
+            report = _reporter(subject.budget, number - 1, len(chosen))
+            own = subject.budget.share(part, report=report)
+            own.report(CODES[min(codes)].title, 0.0)
+            for answer in family_answers(family, replace(subject, budget=own)):
                 answers.append(answer)
                 if isinstance(answer.state, Declined) and answer.state.code == _LATE:
                     cut[answer.code] = spent
         except OutOfStepsError:
-            cut.update(dict.fromkeys(codes[number], spent))
+            cut.update(dict.fromkeys(codes, spent))
         except MemoryError:
-            cut.update(dict.fromkeys(codes[number], _TOO_LARGE))
+            cut.update(dict.fromkeys(codes, _TOO_LARGE))
         except KeyboardInterrupt:
-            rest = itertools.chain.from_iterable(codes[number:])
-            cut.update(dict.fromkeys(rest, INTERRUPTED))
+            for _, rest in chosen[number - 1 :]:
+                cut.update(dict.fromkeys(rest, INTERRUPTED))
             return
 
 
-def _budget_part(subject: Subject, number: int, part: float) -> Budget:
-    """Return the budget of a family, which reports its progress as part of all."""
-    budget, count = subject.budget, len(FAMILIES)
-    return budget.share(
-        1.0 if number == count - 1 else part,
-        report=lambda text, share: budget.report(text, (number + share) / count),
-    )
+def _reporter(budget: Budget, position: int, count: int) -> Progress:
+    """Return a function that reports a family's progress as part of the whole."""
+    return lambda text, share: budget.report(text, (position + share) / count)
 
 
-def family_function(family: Family) -> Callable[[Subject], Iterator[AuditAnswer]]:
-    """Return the function of a family; its module is imported here."""
+def family_answers(family: Family, subject: Subject) -> Iterator[AuditAnswer]:
+    """Yield what the function of a family answers; its module is imported here."""
     module, _, name = family.function.partition(":")
     place = importlib.import_module(f"fuzzytree.auditing.findings.{module}")
-    function: Callable[[Subject], Iterator[AuditAnswer]] = getattr(place, name)
-    return function
+    yield from getattr(place, name)(subject)
 
 
 def _unasked(
@@ -330,13 +314,3 @@ def _located(
             places=locations_of(answer, material.model, material.file, numbers),
             repeat=f"{writable(repeat)} --select {answer.code}" if repeat else "",
         )
-
-
-def _form(model: Document) -> str:
-    match model:
-        case FuzzyTree():
-            return "tree"
-        case RuleBase(kind=kind):
-            return f"{kind} rules" if kind else "rules"
-        case _:
-            return "system"

@@ -105,7 +105,8 @@ class Family(NamedTuple):
 
 FAMILIES: Final = (
     Family("robustness:row_answers", ("FT204",)),
-    Family("terms:answers", ("FT401", "FT404"), 0.2),
+    Family("terms:use_answers", ("FT404",), 0.2),
+    Family("terms:height_answers", ("FT401",), 0.2),
     Family("support:answers", ("FT701",), 0.2),
     Family("deciding:cover_answers", ("FT301",), 0.2),
     Family("deciding:answers", ("FT101", "FT102", "FT103", "FT202")),

@@ -26,12 +26,9 @@ from fuzzytree.model import (
 
 
 class ModelFile(msgspec.Struct, frozen=True, eq=False):
-    """A file that a model was read from.
+    """A file that a model was read from: its path as the user wrote it, and its bytes.
 
-    Attributes:
-        name: Its path as the user wrote it.
-        content: Its bytes.
-        locate: Returns where a part of its model stands.
+    `locate` returns where a part of its model stands.
     """
 
     name: str
@@ -53,14 +50,14 @@ def model_file(name: str, content: bytes) -> ModelFile:
     """Return a file with its places; it is read at the first look-up."""
 
     @functools.cache
-    def known() -> Locate:
+    def locate() -> Locate:
         try:
             read = format_of(name).read
             return nowhere if read is None else read(content, name).locate
         except ReadError:  # such as another format under this suffix
             return nowhere
 
-    return ModelFile(name, content, lambda path: known()(path))
+    return ModelFile(name, content, lambda path: locate()(path))
 
 
 def rule_path(model: Document, number: int) -> Path:
@@ -80,23 +77,17 @@ def rule_path(model: Document, number: int) -> Path:
 
 def term_path(model: Document, label: TermName) -> Path:
     """Return where a model has a term; where its variables are if it has none."""
-    for path, variable, terms in _terms_in(model):
-        if variable == label.variable and label.term in terms:
-            return (*path, terms.index(label.term))
+    owners = [("variables", k, v.name, v.terms) for k, v in enumerate(model.variables)]
+    if isinstance(model, FuzzySystem):
+        outputs = enumerate(model.outputs)
+        owners += [("outputs", k, o.name, o.terms) for k, o in outputs]
+    if isinstance(model, FuzzyTree):
+        owners += [("sets", k, s.variable, s.terms) for k, s in enumerate(model.sets)]
+    for kind, k, name, terms in owners:
+        names = [term.name for term in terms]
+        if name == label.variable and label.term in names:
+            return (kind, k, "terms", names.index(label.term))
     return ("variables",)
-
-
-def _terms_in(model: Document) -> Iterator[tuple[Path, str, list[str]]]:
-    """Yield where a model has terms, the variable, and their names."""
-    for k, variable in enumerate(model.variables):
-        terms = [term.name for term in variable.terms]
-        yield ("variables", k, "terms"), variable.name, terms
-    for k, output in enumerate(model.outputs if isinstance(model, FuzzySystem) else ()):
-        terms = [term.name for term in output.terms]
-        yield ("outputs", k, "terms"), output.name, terms
-    for k, fitted in enumerate(model.sets if isinstance(model, FuzzyTree) else ()):
-        terms = [term.name for term in fitted.terms]
-        yield ("sets", k, "terms"), fitted.variable, terms
 
 
 def locations_of(
@@ -125,11 +116,8 @@ def with_ids(
     concerned, whatever their place in the file; where there are neither, over the
     subject and the region. Equal ids are numbered `-2`, `-3` in order.
 
-    Args:
-        answers: The answers.
-        representations: The rules that their numbers mean, if there are any; then
-            others whose terms may be concerned as well.
-        curves: The true curves of terms with another shape.
+    Numbers of rules mean the first of some `representations`; terms may be of others.
+    `curves` are the true ones of terms with another shape.
     """
     shapes: dict[tuple[str, str], object] = {}
     for representation in reversed(representations):
@@ -138,10 +126,11 @@ def with_ids(
     rules = representations[0].rules if representations else ()
     counts: dict[str, int] = {}
     for answer in answers:
-        known = [_rule_facts(rules[k - 1], shapes) for k in answer.rules]
-        known += [_label_facts(label, shapes) for label in answer.terms]
-        other = [] if known else [answer.subject, answer.region]
-        content = msgspec.json.encode([answer.code, known, other])
+        facts = [_rule_facts(rules[k - 1], shapes) for k in answer.rules]
+        for variable, term in map(msgspec.structs.astuple, answer.terms):
+            facts.append([variable, term, shapes.get((variable, term))])
+        other = [] if facts else [answer.subject, answer.region]
+        content = msgspec.json.encode([answer.code, facts, other])
         name = f"{answer.code}-{hashlib.sha256(content).hexdigest()[:8]}"
         counts[name] = counts.get(name, 0) + 1
         if counts[name] > 1:
@@ -162,13 +151,5 @@ def _rule_facts(rule: Rule, shapes: Mapping[tuple[str, str], object]) -> list[ob
         ]
         for proposition in rule.when
     ]
-    text = sentence(
-        msgspec.structs.replace(rule, when=tuple(sorted(rule.when, key=str)))
-    )
-    return [text, sorted(curves, key=str)]
-
-
-def _label_facts(
-    label: TermName, shapes: Mapping[tuple[str, str], object]
-) -> list[object]:
-    return [label.variable, label.term, shapes.get((label.variable, label.term))]
+    ordered = msgspec.structs.replace(rule, when=tuple(sorted(rule.when, key=str)))
+    return [sentence(ordered), sorted(curves, key=str)]

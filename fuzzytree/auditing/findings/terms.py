@@ -75,13 +75,11 @@ class VariableRange(NamedTuple):
             x = tuple(map(Fraction, range(len(degrees) + 1)))
             lines = Lines(x, (*degrees, degrees[-1]), degrees, degrees)
             return Between(lines, lines)
-        result = lines_of(shape, self.low, self.high)
-        if self.is_open:
-            lower, upper = (
-                one._replace(at=one.after[:1] + one.at[1:]) for one in result
-            )
-            result = Between(lower, lower if result.is_exact else upper)
-        return result
+        both = lines_of(shape, self.low, self.high)
+        if not self.is_open:
+            return both
+        lower, upper = (of._replace(at=of.after[:1] + of.at[1:]) for of in both)
+        return Between(lower, lower if both.is_exact else upper)
 
 
 def ranges(subject: Subject) -> tuple[VariableRange, ...]:
@@ -112,16 +110,11 @@ def measure(name: str, value: Bounds) -> Measure:
     return Measure(name, float((value.low + value.high) / 2), exact)
 
 
-def answers(subject: Subject) -> Iterator[AuditAnswer]:
-    """Answer whether terms are reached, and used."""
-    yield from _unused(subject)
-    yield from _heights(subject)
-
-
 # --- FT401: is the term reached?
 
 
-def _heights(subject: Subject) -> Iterator[AuditAnswer]:
+def height_answers(subject: Subject) -> Iterator[AuditAnswer]:
+    """Answer whether terms are reached."""
     level = Fraction(subject.settings.level)
     clean, lowest = 0, ONE
     for of in ranges(subject):
@@ -188,7 +181,8 @@ def _about(
 # --- FT404: is it used?
 
 
-def _unused(subject: Subject) -> Iterator[AuditAnswer]:
+def use_answers(subject: Subject) -> Iterator[AuditAnswer]:
+    """Answer whether terms are used."""
     system, variables = subject.system, subject.rules.variables
     propositions = [*used_terms(subject.rules)]
     if system is not None and subject.policy.decision == "all":
@@ -200,20 +194,16 @@ def _unused(subject: Subject) -> Iterator[AuditAnswer]:
         if variable.name in needed:
             needed.update(part.input for part in variable.parts)
     proof = Proved(f"{counted(len(propositions), 'proposition')} of all rules read")
-    idle: dict[str, list[TermName]] = {}
     for variable in variables:
-        name = variable.name
-        terms = [TermName(name, term.name) for term in variable.terms]
-        if name not in needed:
-            idle[f"variable {name!r}"] = terms
-    for variable in variables:
-        for term in variable.terms if variable.name in needed else ():
-            if (variable.name, term.name) not in used:
-                title = f"term {term.name!r} of {variable.name!r}"
-                idle[title] = [TermName(variable.name, term.name)]
-    for title, terms in idle.items():
-        yield audit_answer("FT404.unused", title, proof, terms=tuple(terms))
+        if variable.name not in needed:
+            own = tuple(TermName(variable.name, term.name) for term in variable.terms)
+            title = f"variable {variable.name!r}"
+            yield audit_answer("FT404.unused", title, proof, terms=own)
     names = [(one.name, term.name) for one in variables for term in one.terms]
+    for name in names:
+        if name[0] in needed and name not in used:
+            title, own = f"term {name[1]!r} of {name[0]!r}", (TermName(*name),)
+            yield audit_answer("FT404.unused", title, proof, terms=own)
     yield audit_answer(
         "FT404.used",
         "terms and variables",
@@ -388,12 +378,11 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
     counts = {"more": more, "points": points}
     facts = {"overlap": float(limit)} | {name: n for name, n in counts.items() if n}
     if overlaps or apart or points:
+        how = "areas were bounded on cells, and integrated in fractions where near"
         yield audit_answer(
             "FT403.unlisted" if more else "FT403.others",
             "pairs of terms",
-            Proved(
-                "areas were bounded on cells, and integrated in fractions where near"
-            ),
+            Proved(how),
             Measure("pairs apart", apart),
             Measure("pairs not listed", more),
             Measure("pairs without area", points),
@@ -491,32 +480,21 @@ def nauck(subject: Subject) -> list[tuple[str, Bounds]]:
 
 
 def coverage(of: VariableRange) -> Bounds:
-    """Return the mean of h(x) over a range, as `nauck` defines it.
-
-    Example:
-        >>> from fuzzytree.model.rulebase import Points, Term, Variable
-        >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
-        >>> both = Variable("x", (Term("low", down), Term("high", up)))
-        >>> coverage(VariableRange(both, ZERO, ONE)).low
-        Fraction(1, 1)
-    """
+    """Return the mean of h(x) over a range, as `nauck` defines it."""
     curves = [of.lines(term.shape) for term in of.terms]
     low, high = curves[0].lower.x[0], curves[0].lower.x[-1]
     level, totals = constant(ONE, low, high), list[Fraction]()
     for side in (0, 1):
-        lines = combined(
-            [curve[side] for curve in curves], lambda both: both[0] + both[1]
-        )
+        lines = combined([curve[side] for curve in curves], _total)
         below = measures.integral(combined([lines, level], min))
         above = measures.integral(lines) - below  # of two terms or more
         totals.append(below - above / max(len(curves) - 1, 1))
     # Where degrees are enclosed, h differs by no more than their sum does.
-    slack = (
-        sum(
-            (measures.integral(c.upper) - measures.integral(c.lower) for c in curves),
-            ZERO,
-        )
-        / 2
-    )
+    areas = map(measures.area, curves)
+    slack = sum((area.high - area.low for area in areas), ZERO) / 2
     total, width = sum(totals, ZERO) / 2, high - low
     return Bounds(max(total - slack, ZERO) / width, min((total + slack) / width, ONE))
+
+
+def _total(degrees: tuple[Fraction, Fraction]) -> Fraction:
+    return degrees[0] + degrees[1]
