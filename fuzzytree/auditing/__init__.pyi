@@ -36,6 +36,7 @@ from .findings.domains import AuditDomain as AuditDomain
 from .findings.domains import Limits as Limits
 from .findings.domains import domain_of as domain_of
 from .findings.domains import limited as limited
+from .findings.domains import read_value as read_value
 from .findings.locations import ModelFile as ModelFile
 from .findings.locations import model_file as model_file
 from .findings.locations import writable as writable
@@ -55,8 +56,7 @@ from .findings.results import resolved_ids as resolved_ids
 from .findings.subject import AuditRows as AuditRows
 from .findings.subject import AuditView as AuditView
 from .findings.subject import Material as Material
-from .findings.table_words import read_value as read_value
-from .findings.views import view as view
+from .findings.subject import view as view
 from .require.claims import Compliance as Compliance
 from .require.claims import Requirement as Requirement
 from .require.claims import RequirementAnswer as RequirementAnswer

@@ -21,8 +21,7 @@ from fuzzytree.auditing.findings.records import (
     AuditSelection,
     AuditSettings,
 )
-from fuzzytree.auditing.findings.subject import Material
-from fuzzytree.auditing.findings.views import view
+from fuzzytree.auditing.findings.subject import Material, view
 from fuzzytree.model.contracts import Document
 from tests.interop.corpus_fcl import FCL
 from tests.interop.corpus_fis import FIS

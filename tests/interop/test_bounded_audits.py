@@ -9,8 +9,7 @@ import pytest
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditSelection
-from fuzzytree.auditing.findings.subject import Material
-from fuzzytree.auditing.findings.views import view
+from fuzzytree.auditing.findings.subject import Material, view
 from fuzzytree.model import FuzzySystem
 from tests.auditing.findings.grids import check_on_grid
 from tests.interop.audits import CORPORA, LEFT_OUT

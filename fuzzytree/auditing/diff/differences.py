@@ -28,11 +28,10 @@ from fuzzytree.auditing.diff.structure import draft_changes
 from fuzzytree.auditing.diff.system_differences import draft_system_changes
 from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
 from fuzzytree.auditing.findings.audit import source_of, with_confirmations
-from fuzzytree.auditing.findings.domains import Limits, domain_of, limited
+from fuzzytree.auditing.findings.domains import Limits, Words, domain_of, limited
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.auditing.findings.table_words import Words
 from fuzzytree.errors import ReadError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import (

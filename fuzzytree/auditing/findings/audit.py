@@ -24,7 +24,7 @@ from fuzzytree.auditing.findings.codes import (
     audit_answer,
 )
 from fuzzytree.auditing.findings.configuration import check_settings, chosen_codes
-from fuzzytree.auditing.findings.domains import domain_of
+from fuzzytree.auditing.findings.domains import Words, domain_of
 from fuzzytree.auditing.findings.locations import (
     ModelFile,
     locations_of,
@@ -42,9 +42,13 @@ from fuzzytree.auditing.findings.records import (
     SourceFile,
     digest_of,
 )
-from fuzzytree.auditing.findings.subject import AuditView, Material, Subject, subject_of
-from fuzzytree.auditing.findings.table_words import Words
-from fuzzytree.auditing.findings.views import view
+from fuzzytree.auditing.findings.subject import (
+    AuditView,
+    Material,
+    Subject,
+    subject_of,
+    view,
+)
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import Document, fingerprint, kind_of, name_choice, version

@@ -21,7 +21,7 @@ from typing import Annotated, ClassVar, Final
 
 from msgspec import Meta
 
-from fuzzytree.auditing.findings.table_words import read_value
+from fuzzytree.auditing.findings.domains import read_value
 from fuzzytree.auditing.require.claims import (
     Claim,
     ClassClaim,

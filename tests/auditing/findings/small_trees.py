@@ -9,9 +9,8 @@ import numpy as np
 from fuzzytree.auditing.decide import Budget
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.records import AuditSettings
-from fuzzytree.auditing.findings.subject import AuditRows, Subject
+from fuzzytree.auditing.findings.subject import AuditRows, Subject, view
 from fuzzytree.auditing.findings.subject import subject_of as ready
-from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.rulebase import (
     Band,
     Conjunction,

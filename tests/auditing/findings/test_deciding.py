@@ -9,8 +9,7 @@ from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.states import Bracket, Declined, Proved, Witness
 from fuzzytree.auditing.findings.deciding import answers
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
-from fuzzytree.auditing.findings.subject import subject_of
-from fuzzytree.auditing.findings.views import view
+from fuzzytree.auditing.findings.subject import subject_of, view
 from fuzzytree.model.rulebase import (
     Points,
     Proposition,

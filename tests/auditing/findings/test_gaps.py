@@ -9,8 +9,7 @@ from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings.deciding import cover_answers as answers
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
-from fuzzytree.auditing.findings.subject import AuditRows, subject_of
-from fuzzytree.auditing.findings.views import view
+from fuzzytree.auditing.findings.subject import AuditRows, subject_of, view
 from fuzzytree.model.rulebase import (
     Points,
     Proposition,

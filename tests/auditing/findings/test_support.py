@@ -14,7 +14,7 @@ from fuzzytree.auditing.decide.states import Declined, Sampled
 from fuzzytree.auditing.findings import support
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
-from fuzzytree.auditing.findings.subject import AuditRows, Subject
+from fuzzytree.auditing.findings.subject import AuditRows, Subject, view
 from fuzzytree.auditing.findings.subject import subject_of as ready
 from fuzzytree.auditing.findings.support import (
     answers,
@@ -23,7 +23,6 @@ from fuzzytree.auditing.findings.support import (
     sampled_share,
     wilson,
 )
-from fuzzytree.auditing.findings.views import view
 from fuzzytree.model import (
     Document,
     Part,

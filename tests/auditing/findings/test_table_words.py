@@ -17,9 +17,8 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.auditing import AuditDomain, AuditSelection
-from fuzzytree.auditing.findings.domains import domain_of
+from fuzzytree.auditing.findings.domains import domain_of, read_value
 from fuzzytree.auditing.findings.support import sample_points
-from fuzzytree.auditing.findings.table_words import read_value
 from fuzzytree.model import DATE_UNIT, FuzzyTree, RuleBase, Variable
 from fuzzytree.report import audit_lines, diff_lines, page
 from fuzzytree.semantics import rules_from_tree

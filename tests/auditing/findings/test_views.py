@@ -13,8 +13,7 @@ from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.rules import MOST_QUESTIONS, MOST_WAYS
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditSettings
-from fuzzytree.auditing.findings.subject import AuditView, subject_of
-from fuzzytree.auditing.findings.views import view
+from fuzzytree.auditing.findings.subject import AuditView, subject_of, view
 from fuzzytree.model import (
     Activation,
     And,
