@@ -211,17 +211,6 @@ class TreeAndRules:
             self.domain, self.tree.variables, point
         )
 
-    def drawn(self) -> dict[int, dict[str, Fraction]]:
-        """Return for leaves a point that was drawn, at which both differ."""
-        values = np.array([[*map(float, column)] for column in self.base.samples])
-        leaves = decide(self.tree, values).rule
-        result: dict[int, dict[str, Fraction]] = {}
-        for place in np.flatnonzero(self.differing(values)).tolist():
-            leaf, point = int(leaves[place]), self.base.sample(place)
-            if leaf not in result and self.differ(point):
-                result[leaf] = point
-        return result
-
     def differing(self, values: FloatArray) -> BoolArray:
         """Return on which complete rows both differ, exactly; shape (rows,)."""
         own = [leaf.label for leaf in self.tree.leaves]
@@ -233,11 +222,9 @@ class TreeAndRules:
             [own[leaf - 1] != other[rule] for leaf, rule in pairs], np.bool_
         )
 
-    def difference(
-        self, leaf: int, point: Mapping[str, Fraction] | None, budget: Budget
-    ) -> State:
-        """Return where both differ in a leaf, perhaps at a point; Proved if nowhere."""
-        is_spent = False
+    def difference(self, leaf: int, budget: Budget) -> State:
+        """Return where both differ in a leaf, or that they do nowhere."""
+        is_spent, point = False, None
         for part, number in enumerate(self.leaves.numbers):
             box = self.leaves.boxes[part]
             start = point_in(box, self.tree) if number == leaf else None
@@ -252,8 +239,7 @@ class TreeAndRules:
             except OutOfStepsError:
                 is_spent = True
                 continue
-            if isinstance(answer, Point):
-                point = answer.values
+            point = answer.values if isinstance(answer, Point) else None
             is_spent |= not isinstance(answer, Point | NoPoint)
         if point is None:
             return Declined("FTD03", "the budget was spent") if is_spent else Proved("")
@@ -285,11 +271,10 @@ def raw_answers(subject: Subject) -> Iterator[AuditAnswer]:
         yield audit_answer("FT203.leaves-declined", "leaves", declined)
         return
     both = TreeAndRules(tree, raw, subject.domain)
-    drawn, alike, count = both.drawn(), 0, len(tree.leaves)
+    alike, count = 0, len(tree.leaves)
     for leaf in range(1, count + 1):
         subject.budget.report(f"leaf {leaf} against the raw rules", leaf / count)
-        budget = subject.budget.share(_LEAF_PART)
-        state = both.difference(leaf, drawn.get(leaf), budget)
+        state = both.difference(leaf, subject.budget.share(_LEAF_PART))
         name, rules = f"leaf {leaf}", [leaf]
         if isinstance(state, Proved):
             alike += 1
