@@ -174,13 +174,13 @@ def _unreached(
     for variable, union in region.sides:
         side = subject.domain.side(variable)
         if not union:
-            message, facts = "FT101.leaf-excluded", {"variable": variable}
+            message, facts["variable"] = "FT101.leaf-excluded", variable
             break
         if side is not None and not any(cut_side(side, part) for part in union):
             values = " or ".join(open_interval(low, high) for low, high in union)
             ends = {"low": side.low, "high": side.high}
             message = "FT101.leaf-outside"
-            facts = {"variable": variable, "values": values, **ends}
+            facts |= {"variable": variable, "values": values, **ends}
             break
     return audit_answer(
         message,

@@ -285,12 +285,13 @@ def nearest_rows(
     costs = Costs(domain, inputs)
     every = [_part(domain, sides, sums) for sides in boxes]
     parts = Polytopes(inputs, [polytope_of(part, inputs, sums) for part in every])
-    fixed = {side.variable: side.low for side in domain.sides if side.low == side.high}
+    fixed = {
+        side.variable: Fraction(side.low)
+        for side in domain.sides
+        if side.low == side.high and side.variable in inputs
+    }
     points = {
-        number: {
-            name: Fraction(fixed.get(name, value))
-            for name, value in zip(inputs, values, strict=True)
-        }
+        number: dict(zip(inputs, map(Fraction, values), strict=True)) | fixed
         for number, values in enumerate(rows.values.T.tolist(), 1)
         if all(map(math.isfinite, values))
     }

@@ -7,12 +7,12 @@ rows there are is left to chance, and the interval says how much that may change
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from fractions import Fraction
 from statistics import NormalDist
-from typing import Final
+from typing import Final, NamedTuple
 
-import msgspec
 import numpy as np
 
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
@@ -130,42 +130,37 @@ def rows_outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArr
     return beyond
 
 
-class RuleCounts(msgspec.Struct, frozen=True, eq=False):
+class RuleCounts(NamedTuple):
     """What the rules say about some rows.
 
     Attributes:
-        missing: In how many rows a value is missing; nothing else is counted of them.
-        fired, won, right: On how many rows each rule fires; how many it wins, as the
-            first of the strongest; how many of those have its class.
-        uncovered, weak: Rows on which no rule fires, or none is as strong as epsilon.
-        tied, close: Covered rows whose strongest classes are equally strong, or differ
-            by at most the margin.
-        outside: Rows with a value outside the domain.
+        rows: How many there are; on how many a value is `missing`, or `outside` of the
+            domain; of those without a missing value: how many are `known`, on how many
+            no rule fires (`uncovered`) or reaches epsilon (`weak`), and on how many the
+            strongest classes tie (`tied`) or differ by at most the margin (`close`).
+        fired, won, right: On how many known rows each rule fires; how many it wins, as
+            the first of the strongest; how many of those have its class.
     """
 
-    rows: int
-    missing: int
-    outside: int
+    rows: Counter[str]
     fired: IntArray
-    uncovered: int
-    weak: int
-    tied: int = 0
-    close: int = 0
     won: IntArray | None = None
     right: IntArray | None = None
 
-    @property
-    def known(self) -> int:
-        """The rows without a missing value."""
-        return self.rows - self.missing
+
+def _row_counts(
+    outside: BoolArray, known: BoolArray, **of_known: BoolArray
+) -> Counter[str]:
+    masks = {"all": known | True, "outside": outside, "missing": ~known, "known": known}
+    masks |= {name: known & mask for name, mask in of_known.items()}
+    return Counter({name: int(mask.sum()) for name, mask in masks.items()})
 
 
 def count_rows(
     subject: Subject, values: FloatArray, codes: IntArray | None = None
 ) -> RuleCounts:
     """Count what rules say of which the strongest decides, of (inputs, rows)."""
-    rules, settings = subject.rules, subject.settings
-    totals = dict.fromkeys(("missing", "uncovered", "weak", "tied", "close"), 0)
+    rules, settings, rows = subject.rules, subject.settings, Counter[str]()
     count = len(rules.rules)
     fired, won, right = (np.zeros(count, np.int64) for _ in range(3))
     owner = np.array([rules.classes.index(rule.then) for rule in rules.rules])
@@ -175,7 +170,7 @@ def count_rows(
         decisions = decide(rules, part)
         fires, is_weak, margin = _exact_parts(subject, part, decisions)
         is_known = decisions.status != MISSING
-        is_covered = is_known & (decisions.status != UNCOVERED)
+        is_covered = decisions.status != UNCOVERED
         fired += (fires & is_known).sum(axis=1)
         won += np.bincount(decisions.rule, minlength=count + 1)[1:]
         if codes is not None:
@@ -183,22 +178,15 @@ def count_rows(
             own = decisions.rule[is_won] - 1
             is_right = codes[start : start + _STEP][is_won] == owner[own]
             right += np.bincount(own[is_right], minlength=count)
-        for name, hits in (
-            ("missing", ~is_known),
-            ("uncovered", decisions.status == UNCOVERED),
-            ("weak", is_known & is_weak),
-            ("tied", is_covered & (margin == 0.0)),
-            ("close", is_covered & (margin <= settings.margin)),
-        ):
-            totals[name] += int(hits.sum())
-    return RuleCounts(
-        rows=values.shape[1],
-        outside=int(rows_outside(rules, subject.domain, values).sum()),
-        fired=fired,
-        won=won,
-        right=None if codes is None else right,
-        **totals,
-    )
+        rows += _row_counts(
+            rows_outside(rules, subject.domain, part),
+            is_known,
+            uncovered=~is_covered,
+            weak=is_weak,
+            tied=is_covered & (margin == 0.0),
+            close=is_covered & (margin <= settings.margin),
+        )
+    return RuleCounts(rows, fired, won, None if codes is None else right)
 
 
 def _exact_parts(
@@ -264,7 +252,7 @@ def _system_counts(
     """
     base, level = subject.base.fine, subject.settings.epsilon
     outside = rows_outside(subject.rules, subject.domain, values)
-    known = ~np.isnan(values).any(axis=0)
+    known = np.asarray(~np.isnan(values).any(axis=0), np.bool_)
     columns = dict(zip(subject.rules.inputs, values, strict=True))
     sides = [base.in_doubles(columns, is_upper=is_upper) for is_upper in (False, True)]
     is_open = outside & np.isfinite(values).all(axis=0)
@@ -277,18 +265,12 @@ def _system_counts(
         point = {name: Fraction(float(x[row])) for name, x in columns.items()}
         for side, exact in zip(sides, base.strengths(point), strict=True):
             side[:, row] = [_on_side(strength, level) for strength in exact]
-    least, most = (
-        RuleCounts(
-            rows=values.shape[1],
-            missing=int((~known).sum()),
-            outside=int(outside.sum()),
-            fired=((side > 0.0) & known).sum(axis=1),
-            uncovered=int((known & (side.max(axis=0) <= 0.0)).sum()),
-            weak=int((known & (side.max(axis=0) < level)).sum()),
-        )
-        for side in sides
-    )
-    return least, most
+    results: list[RuleCounts] = []
+    for side in sides:
+        best, fired = side.max(axis=0), ((side > 0.0) & known).sum(axis=1)
+        rows = _row_counts(outside, known, uncovered=best <= 0.0, weak=best < level)
+        results.append(RuleCounts(rows, fired))
+    return results[0], results[1]
 
 
 def _on_side(strength: Fraction, limit: float) -> float:
@@ -315,17 +297,17 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
     """Yield what the user's rows say, of all rules together and of each."""
     codes = None if subject.system else rows.codes  # a view has classes of its own
     lower, most = _counts(subject, rows.values, codes, is_each=True)
-    how = f"every row of {rows.name}"
-    total = lower.rows
-    for message, name, hits in (
-        ("FT701.missing", "rows with a missing value", lower.missing),
-        ("FT701.outside", "rows outside the domain", lower.outside),
+    counts, how = lower.rows, f"every row of {rows.name}"
+    for word, name in (
+        ("missing", "rows with a missing value"),
+        ("outside", "rows outside the domain"),
     ):
-        state = sampled_share(name, hits, total, how)
-        yield audit_answer(message, name, state, is_finding=hits > 0)
-    if not lower.known:
+        state = sampled_share(name, counts[word], counts["all"], how)
+        is_finding = counts[word] > 0
+        yield audit_answer(f"FT701.{word}", name, state, is_finding=is_finding)
+    if not counts["known"]:
         return
-    if lower.missing:
+    if counts["missing"]:
         how += " without a missing value"
     yield from _shares(subject, (lower, most), "rows", how)
     for number in range(1, len(subject.rules.rules) + 1):
@@ -333,7 +315,8 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
         if fired == least:
             yield _of_rule(subject, lower, number, how)
             continue
-        why = f"it fires on {least} of {lower.known} at least, and on {fired} at most"
+        known = counts["known"]
+        why = f"it fires on {least} of {known} at least, and on {fired} at most"
         declined, name = Declined("FTD02", why), subject.rule_name(number)
         yield audit_answer("FT701.rule-open", name, declined)
 
@@ -350,7 +333,7 @@ def _of_domain(subject: Subject) -> Iterator[AuditAnswer]:
         return
     lower, most = _counts(subject, points)
     how = f"points drawn evenly from the domain, seed {settings.seed}"
-    if lower.known:  # a combination may overflow everywhere
+    if lower.rows["known"]:  # a combination may overflow everywhere
         yield from _shares(subject, (lower, most), "points", how)
 
 
@@ -372,16 +355,13 @@ def _shares(
     subject: Subject, counts: tuple[RuleCounts, RuleCounts], noun: str, how: str
 ) -> Iterator[AuditAnswer]:
     """Yield in which share of some rows or points the rules are weak or undecided."""
-    lower, most = counts
-    settings, total = subject.settings, lower.known
-    questions: list[tuple[str, int]] = []
-    for name, hits, fewest in (
-        ("uncovered", lower.uncovered, most.uncovered),
-        ("weak", lower.weak, most.weak),
-    ):
-        if fewest >= hits and subject.is_whole:
-            questions.append((name, hits))
-        elif subject.is_whole:
+    (lower, *_), (most, *_) = counts
+    settings, total, names = subject.settings, lower["known"], list[str]()
+    for name in ("uncovered", "weak") if subject.is_whole else ():
+        hits, fewest = lower[name], most[name]
+        if fewest >= hits:
+            names.append(name)
+        else:
             reason = f"there are {fewest} at least, and {hits} at most"
             state = Declined("FTD02", reason)
             yield audit_answer("FT701.not-known", f"{name} {noun}", state)
@@ -390,9 +370,10 @@ def _shares(
         state = Declined("FTD07", reason)
         yield audit_answer("FT701.not-known", f"covered {noun}", state)
     if subject.policy.decision == "strongest":
-        questions += [("tied", lower.tied), ("close", lower.close)]
+        names += ["tied", "close"]
     limits = {"epsilon": settings.epsilon, "margin": settings.margin}
-    for name, hits in questions:
+    for name in names:
+        hits = lower[name]
         yield audit_answer(
             f"FT701.{name}",
             f"{name} {noun}",
@@ -406,7 +387,7 @@ def _of_rule(
     subject: Subject, counts: RuleCounts, number: int, how: str
 ) -> AuditAnswer:
     """Return on how many rows a rule fires, how many it wins, and how many rightly."""
-    name, total = subject.rule_name(number), counts.known
+    name, total = subject.rule_name(number), counts.rows["known"]
     fired = int(counts.fired[number - 1])
     facts: dict[str, FactValue] = {"known": total}
     measures = [Measure("rows fired", fired)]

@@ -168,12 +168,12 @@ def test_counts_are_those_of_answers_in_fractions(conjunction: str) -> None:
     known = [one for one in exact if one.status != MISSING]
     covered = [one for one in known if one.status != UNCOVERED]
     settings = subject.settings
-    assert found.known == len(known)
-    assert found.uncovered == len(known) - len(covered)
+    assert found.rows["known"] == len(known)
+    assert found.rows["uncovered"] == len(known) - len(covered)
     level, margin = Fraction(settings.epsilon), Fraction(settings.margin)
-    assert found.weak == sum(max(one.strengths) < level for one in known)
-    assert found.tied == sum(not one.margin for one in covered)
-    assert found.close == sum(one.margin <= margin for one in covered)
+    assert found.rows["weak"] == sum(max(one.strengths) < level for one in known)
+    assert found.rows["tied"] == sum(not one.margin for one in covered)
+    assert found.rows["close"] == sum(one.margin <= margin for one in covered)
     assert found.won is not None
     for k in range(len(rules.rules)):
         assert found.fired[k] == sum(one.strengths[k] > 0 for one in known)
@@ -197,12 +197,14 @@ def test_rows_exactly_at_an_end_a_level_and_a_margin_are_counted_exactly() -> No
     exact = [exact_answer(rules, {"force": float(x)}) for x in values[0]]
     found = count_rows(subject_of(rules), values)
     assert found.fired.tolist() == [4, 4]
-    assert found.tied == 1
+    assert found.rows["tied"] == 1
     assert [one.status == TIE for one in exact] == [False] * 4 + [True]
     narrow = AuditSettings(epsilon=0.5, margin=float(exact[3].margin))
     again = count_rows(subject_of(rules, settings=narrow), values)
-    assert again.weak == 0
-    assert again.close == sum(one.margin <= Fraction(narrow.margin) for one in exact)
+    assert again.rows["weak"] == 0
+    assert again.rows["close"] == sum(
+        one.margin <= Fraction(narrow.margin) for one in exact
+    )
 
 
 def test_points_are_drawn_within_the_domain_and_alike_for_a_seed() -> None:
