@@ -229,10 +229,7 @@ def source_of(name: str, content: bytes) -> SourceFile:
 
 
 def _answer_all(
-    subject: Subject,
-    wanted: set[str],
-    answers: list[AuditAnswer],
-    cut: dict[str, str],
+    subject: Subject, wanted: set[str], answers: list[AuditAnswer], cut: dict[str, str]
 ) -> None:
     """Add the answers of all families, each within its part of the budget.
 

@@ -26,15 +26,7 @@ from msgspec import Meta, field
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.files import PathLike, read_bounded
-from fuzzytree.formats import (
-    FileRecord,
-    MappingNode,
-    Name,
-    bind,
-    compose,
-    find,
-    report,
-)
+from fuzzytree.formats import FileRecord, MappingNode, Name, bind, compose, find, report
 from fuzzytree.model import Path, as_names, name_choice
 
 _SHARES = ("epsilon", "margin", "lead", "level", "overlap")

@@ -14,12 +14,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.domain import Domain
-from fuzzytree.auditing.decide.states import (
-    Bracket,
-    Computed,
-    Declined,
-    State,
-)
+from fuzzytree.auditing.decide.states import Bracket, Computed, Declined, State
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
@@ -29,14 +24,7 @@ from fuzzytree.auditing.findings.support import (
     sampled_share,
 )
 from fuzzytree.checking import check
-from fuzzytree.model import (
-    Agreement,
-    Certified,
-    Comparison,
-    Dtype,
-    Model,
-    Variable,
-)
+from fuzzytree.model import Agreement, Certified, Comparison, Dtype, Model, Variable
 from fuzzytree.numerics import TIE, certify, decide
 from fuzzytree.runtimes import all_runtimes
 from fuzzytree.semantics import forms, probe_values
