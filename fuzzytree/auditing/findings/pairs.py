@@ -229,14 +229,17 @@ def _may_conflict(subject: Subject, pair: Pair) -> bool:
     rules = [subject.base.rules[place] for place in pair]
     if rules[0].then == rules[1].then or subject.policy.decision == "strongest":
         return rules[0].then != rules[1].then
-    thens: list[dict[str, set[str]]] = [{}, {}]
-    for rule, conclusions in zip(rules, thens, strict=True):
-        for text in rule.then.split(" and "):
-            for output, _ in rule.conclusions:
-                if text.startswith(f"{output} is "):
-                    conclusions.setdefault(output, set()).add(text)
-    shared = thens[0].keys() & thens[1].keys()
-    return any(thens[0][name] != thens[1][name] for name in shared)
+    texts = [
+        {
+            output: {
+                t for t in rule.then.split(" and ") if t.startswith(f"{output} is ")
+            }
+            for output, _ in rule.conclusions
+        }
+        for rule in rules
+    ]
+    shared = texts[0].keys() & texts[1].keys()
+    return any(texts[0][output] != texts[1][output] for output in shared)
 
 
 def _conflict(subject: Subject, pair: Pair, common: Common) -> AuditAnswer:
