@@ -77,20 +77,9 @@ def audit(
     When the budget is spent, or at a Ctrl-C, nothing new is begun: what is proved is
     kept, and `unasked` lists the rest.
 
-    Args:
-        material: The model, its file and the user's rows.
-        domain: The domain; the model's ranges by default.
-        row: A row whose nearest other decision is also sought.
-        selection: The codes to answer; all by default.
-        settings: The thresholds.
-        report: Called with what is done now, and with its share in [0, 1] of all.
-        repeat: The command that repeats this audit.
-
-    Example:
-        >>> from fuzzytree.testing import random_tree
-        >>> counts = AuditSelection(select=["FT501"])
-        >>> audit(Material(random_tree(1)), selection=counts).is_complete
-        True
+    The `domain` is that of the model's ranges by default. Of a `row` the nearest other
+    decision is also sought. `report` is called with what is done now, and with its
+    share in [0, 1] of all; `repeat` is the command that repeats this audit.
     """
     model, rows, file = material.model, material.rows, material.file
     selection, settings = selection or AuditSelection(), settings or AuditSettings()

@@ -68,11 +68,6 @@ def audit_answer(
     The message says of which code and severity the answer is, and whether it is a
     finding; where it leaves that open, `is_finding` does. Of messages `FTD` the state
     has the code. Of the facts those are kept that the message shows.
-
-    Example:
-        >>> state = Declined("FTD06", "rows are needed")
-        >>> audit_answer("FT701.needs-rows", "rows", state).sentence
-        'what rows say about the rules is not known: rows are needed'
     """
     code, grade = message.partition(".")[0], MESSAGES[message].grade
     if code == "FTD":

@@ -45,10 +45,6 @@ def chosen_codes(select: Sequence[str] = (), skip: Sequence[str] = ()) -> set[st
 
     The reasons are always included: without them the other answers seem to be about
     more than they are.
-
-    Example:
-        >>> sorted(chosen_codes(["FT10"], ["FT102", "FT103"]))[:5]
-        ['FT101', 'FT104', 'FT105', 'FT106', 'FT107']
     """
     select, skip = as_names(select), as_names(skip)
     for text in (*select, *skip):
@@ -84,12 +80,7 @@ def check_settings(settings: AuditSettings) -> None:
 
 
 def settings_with(settings: AuditSettings, texts: Mapping[str, str]) -> AuditSettings:
-    """Return settings with others, but the budget, as a user writes them.
-
-    Example:
-        >>> settings_with(AuditSettings(), {"epsilon": "0.2"}).epsilon
-        0.2
-    """
+    """Return settings with others, but the budget, as a user writes them."""
     names = [name for name in (*_RANGES, *_COUNTS) if name != "budget"]
     values: dict[str, float] = {}
     for name, text in texts.items():
@@ -125,24 +116,10 @@ class LimitsOfFile(FileRecord, frozen=True, kw_only=True):
     to: float
 
 
-class SettingsOfFile(FileRecord, frozen=True, kw_only=True):
+class SettingsOfFile(FileRecord, AuditSettings, frozen=True, kw_only=True):
     """What is taken for small; see `AuditSettings`."""
 
     noun: ClassVar[str] = "settings"
-    epsilon: float | None = None
-    margin: float | None = None
-    lead: float | None = None
-    level: float | None = None
-    overlap: float | None = None
-    rows: int | None = None
-    seed: int | None = None
-    budget: float | None = None
-
-    def __iter__(self) -> Iterator[tuple[str, float]]:
-        """Yield the settings of the file by name."""
-        for name, value in msgspec.structs.asdict(self).items():
-            if value is not None:
-                yield name, value
 
 
 class Configuration(FileRecord, frozen=True, kw_only=True):
@@ -157,14 +134,14 @@ class Configuration(FileRecord, frozen=True, kw_only=True):
     select: _Codes = ()
     skip: _Codes = ()
     limits: Annotated[tuple[LimitsOfFile, ...], Meta(max_length=10_000)] = ()
-    settings: SettingsOfFile | None = None
+    settings: SettingsOfFile = SettingsOfFile()
     baseline: Name | None = None
     fail_on: FailOn | None = field(name="fail-on", default=None)
 
     @property
     def audit_settings(self) -> AuditSettings:
         """The settings, the defaults where one is left out."""
-        return msgspec.structs.replace(AuditSettings(), **dict(self.settings or ()))
+        return AuditSettings(**msgspec.structs.asdict(self.settings))
 
 
 def read_configuration(path: PathLike) -> Configuration:
@@ -193,7 +170,7 @@ def configuration(content: bytes, name: str) -> Configuration:
 
 def _wrong(bound: Configuration) -> Iterator[tuple[Path, str]]:
     """Yield the places of values that are none, and why."""
-    for name, value in bound.settings or ():
+    for name, value in msgspec.structs.asdict(bound.settings).items():
         try:
             check_settings(msgspec.structs.replace(AuditSettings(), **{name: value}))
         except ValueError as error:

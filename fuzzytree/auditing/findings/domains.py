@@ -139,13 +139,6 @@ def limited(domain: Domain, limits: Limits, model: Document) -> Domain:
     """Return a domain with other ends for some variables.
 
     A stand-in for missing values stays where it lies between the ends, or is named.
-
-    Example:
-        >>> from fuzzytree.model import Rule, RuleBase, Variable
-        >>> city = Variable("city", categories=("Bern", "Oslo", "Rom"))
-        >>> model = RuleBase("m", ("a",), (city,), (Rule((), "a"),))
-        >>> limited(domain_of(model), {"city": "Rom,Bern"}, model).sides[0].values
-        (0.0, 2.0)
     """
     names = [variable.name for variable in model.variables]
     for name in limits:
@@ -283,12 +276,7 @@ def _limits_of(name: str) -> str:
 
 
 class Words:
-    """The inputs of a model, as their table has them.
-
-    Args:
-        domain: The values that rows can have.
-        variables: Those of the model.
-    """
+    """The inputs of a model on a domain, as their table has them."""
 
     def __init__(self, domain: Domain, variables: Iterable[Variable]) -> None:
         self._columns = {one.name: one for one in variables if not one.parts}
@@ -358,12 +346,6 @@ def read_value(variable: Variable, text: str) -> float:
     """Return a value of an input from the words of its table.
 
     An empty text, or `missing`, is what stands for a missing value.
-
-    Example:
-        >>> read_value(Variable("city", categories=("Bern", "Rom")), "Rom")
-        1.0
-        >>> read_value(Variable("day", unit="days since 1970-01-01"), "1970-01-03")
-        2.0
     """
     text = text.strip()
     value: float | None
