@@ -2,9 +2,9 @@
 
 An audit
     - `records`: an audit, its answers and settings; `codes`: every question and reason
-    - `subject`, `views`: the model and its rules, as each family receives them
+    - `subject`: the model and its rules, as each family receives them
     - `audit`: runs all families within the budget
-    - `domains`, `table_words`: where rows lie, in the words of their table
+    - `domains`: where rows lie, in the words of their table
     - `locations`: where rules stand in a file; ids that do not depend on their order
     - `configuration`, `results`: settings, accepted findings, results of other verbs
 

@@ -285,13 +285,8 @@ def nearest_rows(
     costs = Costs(domain, inputs)
     every = [_part(domain, sides, sums) for sides in boxes]
     parts = Polytopes(inputs, [polytope_of(part, inputs, sums) for part in every])
-    fixed = {
-        side.variable: Fraction(side.low)
-        for side in domain.sides
-        if side.low == side.high and side.variable in inputs
-    }
     points = {
-        number: dict(zip(inputs, map(Fraction, values), strict=True)) | fixed
+        number: dict(zip(inputs, map(Fraction, values), strict=True))
         for number, values in enumerate(rows.values.T.tolist(), 1)
         if all(map(math.isfinite, values))
     }
