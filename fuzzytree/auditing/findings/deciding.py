@@ -26,11 +26,8 @@ from fuzzytree.auditing.findings.robustness import distance_measure, nearest_row
 from fuzzytree.auditing.findings.subject import Subject, state_of
 from fuzzytree.numerics import outwards
 
-MOST_SHOWN: Final = 20
-"""The most ties that are listed one by one."""
-
-MOST_GAPS: Final = 8
-"""The most gaps that are listed one by one."""
+MOST_SHOWN: Final = 20  # the most ties that are listed one by one
+MOST_GAPS: Final = 8  # the most gaps that are listed one by one
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:

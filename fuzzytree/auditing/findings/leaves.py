@@ -47,9 +47,7 @@ from fuzzytree.rechecking import listed, open_interval
 MOST_BOXES: Final = 20_000
 """Boxes of all leaves together, beyond which a tree's regions are not looked at."""
 
-MOST_LISTED: Final = 1000
-"""Boxes beyond which the regions of leaves are not listed."""
-
+MOST_LISTED: Final = 1000  # boxes beyond which the regions of leaves are not listed
 _LEAF_PART = 0.25  # of the steps that are left, to compare a leaf with the raw rules
 
 

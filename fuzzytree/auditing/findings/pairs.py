@@ -35,8 +35,7 @@ from fuzzytree.numerics import outwards
 NEARLY: Final = Fraction(1, 10**6)
 """Two antecedents are nearly the same if no degree differs by more than this."""
 
-MOST_SHOWN: Final = 20
-"""The most conflicts that are listed one by one."""
+MOST_SHOWN: Final = 20  # the most conflicts that are listed one by one
 
 MOST_PROPOSITIONS: Final = 100
 """The most propositions that matter that are listed one by one."""

@@ -33,9 +33,7 @@ if TYPE_CHECKING:
     from fuzzytree.model import FloatArray
     from fuzzytree.runtimes import OnnxModel
 
-PROBES: Final = 2_000
-"""The most probes of a comparison."""
-
+PROBES: Final = 2_000  # the most probes of a comparison
 _MOST_ROWS = 2_000  # rows or points that stand behind the probes
 
 

@@ -41,15 +41,9 @@ from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model import Variable
 from fuzzytree.numerics import decide, outwards
 
-MOST_ROWS = 50
-"""Rows whose radius is sought by strengths."""
-
-MOST_ROWS_OF_TREE = 1000
-"""Rows whose radius is sought by regions, which is quick."""
-
-SHOWN_ROWS = 5
-"""Rows of the smallest radius that have an answer of their own."""
-
+MOST_ROWS = 50  # rows whose radius is sought by strengths
+MOST_ROWS_OF_TREE = 1000  # rows whose radius is sought by regions, which is quick
+SHOWN_ROWS = 5  # rows of the smallest radius that have an answer of their own
 _PART = 0.9  # of the steps, to seek; the rest is for other codes
 _MOST_NAMED = 4  # inputs in a sentence
 _MOST_DIGITS = 80  # of an exact number beside a double

@@ -42,9 +42,7 @@ from fuzzytree.numerics import (
     proposition_enclosure,
 )
 
-CONFIDENCE: Final = 0.95
-"""Of every interval."""
-
+CONFIDENCE: Final = 0.95  # of every interval
 _NEAR = 1e-12  # doubles that are so near are compared in fractions
 _STEP = 4096  # rows between two looks at the clock
 _MOST_DEGREES = 1 << 24  # of all propositions at points that are drawn

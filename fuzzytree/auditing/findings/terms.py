@@ -338,9 +338,7 @@ def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
 
 # --- FT403: is it distinguished from others?
 
-MOST_SHOWN: Final = 20
-"""The most pairs of terms that are listed one by one."""
-
+MOST_SHOWN: Final = 20  # the most pairs of terms that are listed one by one
 _MOST_KNOTS: Final = 4_000  # of two curves whose overlap is computed
 
 
