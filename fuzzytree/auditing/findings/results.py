@@ -8,24 +8,23 @@ import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import msgspec
 from msgspec import inspect
 
 from fuzzytree.auditing.findings.locations import writable
 from fuzzytree.auditing.findings.records import Audit, SourceFile, VerbResult
-from fuzzytree.checking import Stability
 from fuzzytree.errors import ReadError
 from fuzzytree.files import PathLike, read_bounded
 from fuzzytree.model import Agreement, Document, fingerprint, version
 
+if TYPE_CHECKING:
+    from fuzzytree.checking import Stability
+
 FORMAT: Final = "fuzzytree-baseline/1"
 
 _MOST_BYTES = 64 * 2**20
-_KINDS: dict[str, type[Agreement] | type[Stability]] = {
-    kind.FORMAT: kind for kind in (Agreement, Stability)
-}
 _ID = re.compile(r"FT[0-9D][0-9]{2}-[0-9a-f]{8}(-[1-9][0-9]*)?")
 
 
@@ -115,24 +114,28 @@ def read_results(
 
 def _result(record: Agreement | Stability, file: SourceFile) -> VerbResult:
     """Return the summary of a result."""
-    if isinstance(record, Stability):
-        verdicts = [criterion.verdict for criterion in record.criteria]
-        return VerbResult("stability", file, len(verdicts), verdicts.count("FAILS"))
-    count = len(record.comparisons) + len(record.certificates)
-    return VerbResult("check", file, count, len(record.wrong))
+    if isinstance(record, Agreement):
+        count = len(record.comparisons) + len(record.certificates)
+        return VerbResult("check", file, count, len(record.wrong))
+    verdicts = [criterion.verdict for criterion in record.criteria]
+    return VerbResult("stability", file, len(verdicts), verdicts.count("FAILS"))
 
 
 def _decoded(content: bytes, name: str) -> Agreement | Stability:
     """Return the record in a file, which must be as this version wrote it."""
+    from fuzzytree.checking import Stability  # which few audits need
+
+    every: tuple[type[Agreement] | type[Stability], ...] = (Agreement, Stability)
+    kinds = {kind.FORMAT: kind for kind in every}
     lead = f"{name}: is no result that `fuzzytree check` or `stability` --json wrote"
     try:
         facts = msgspec.json.decode(content, type=dict[str, object])
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ReadError(f"{lead}: {_quoted(error)}") from error
     form, made_by = facts.get("format"), facts.get("version")
-    kind = _KINDS.get(form) if isinstance(form, str) else None
+    kind = kinds.get(form) if isinstance(form, str) else None
     if kind is None:
-        raise ReadError(f"{lead}: its format is none of {', '.join(_KINDS)}")
+        raise ReadError(f"{lead}: its format is none of {', '.join(kinds)}")
     if made_by != version():
         raise ReadError(
             f"{name}: is a result of fuzzytree {str(made_by)[:40]}, and this is "
