@@ -10,7 +10,7 @@ GOAL = 600
 """The number of functions that such an audit should enter at most."""
 
 MOST = 680
-"""What it may enter today: 653 were measured."""
+"""What it may enter today: 651 were measured."""
 
 COUNT = """
 import inspect, sys

@@ -222,7 +222,7 @@ class TreeAndRules:
 
     def difference(self, leaf: int, budget: Budget) -> State:
         """Return where both differ in a leaf, or that they do nowhere."""
-        is_spent, point = False, None
+        why, point = "", None
         for part, number in enumerate(self.leaves.numbers):
             box = self.leaves.boxes[part]
             start = point_in(box, self.tree) if number == leaf else None
@@ -235,12 +235,14 @@ class TreeAndRules:
             try:
                 answer = search.any()
             except OutOfStepsError:
-                is_spent = True
+                why = why or "the budget was spent"
                 continue
-            point = answer.values if isinstance(answer, Point) else None
-            is_spent |= not isinstance(answer, Point | NoPoint)
+            if isinstance(answer, Point):
+                point = answer.values
+            elif not isinstance(answer, NoPoint):
+                why = why or answer.why
         if point is None:
-            return Declined("FTD03", "the budget was spent") if is_spent else Proved("")
+            return Declined("FTD03", why) if why else Proved("")
         label = decided(self.base, point)[0]
         near = simplified(
             point,
@@ -295,9 +297,6 @@ def raw_answers(subject: Subject) -> Iterator[AuditAnswer]:
         values = subject.rows.values[:, np.isfinite(subject.rows.values).all(axis=0)]
         if values.shape[1]:
             what = "rows that raw rules decide differently"
-            hits, how = (
-                int(both.differing(values).sum()),
-                f"rows of {subject.rows.name}",
-            )
-            state = sampled_share(what, hits, values.shape[1], how)
+            hits, of = int(both.differing(values).sum()), f"rows of {subject.rows.name}"
+            state = sampled_share(what, hits, values.shape[1], of)
             yield audit_answer("FT203.rows", "rows", state)
