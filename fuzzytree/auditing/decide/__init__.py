@@ -10,7 +10,8 @@ The question
 
 Ways to decide
     - `decider`: which method decides a question
-    - `levels`: the minimum; `boxes`, `bounds`: products and curves; `solver`: z3
+    - `levels`: the minimum; `solver`: z3
+    - `boxes`, `stretches`, `bounds`: products and curves, in doubles
     - `linear`, `polytopes`, `regions`: linear inequalities, the leaves of a tree
 
 Claims
