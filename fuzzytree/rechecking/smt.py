@@ -15,6 +15,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from types import MappingProxyType
@@ -27,6 +28,7 @@ Ends = tuple[Fraction, Fraction]
 CELLS, PARTS = 24, 8
 """Into so many cells a curve is cut, and each of them to find its error."""
 _DIGITS = 12  # of a double that is a constant of its own
+_LARGEST = Fraction(sys.float_info.max)
 _GRID = 2**12  # bounds of such a curve are rounded outwards to parts of this
 _RESERVED = re.compile(
     "abs|acos|and|arctan|as|asin|assert|atan|concat|const|cos|default|distinct|div|e|"
@@ -73,7 +75,10 @@ def lines_of(curve: Curve, low: Fraction, high: Fraction) -> tuple[Lines, Lines]
     if is_straight(curve):
         result = _straight(curve)
         return result, result
-    step = Fraction(2) ** math.floor(math.log2((high - low) / CELLS))
+    part = (high - low) / CELLS
+    bits = part.numerator.bit_length() - part.denominator.bit_length()
+    step = Fraction(2) ** bits
+    step = step if step <= part else step / 2
     start, end = math.floor(low / step) + 1, math.ceil(high / step)
     cells = [low, *(k * step for k in range(start, end)), high]
     both = [_enclosed(curve, a, b) for a, b in itertools.pairwise(cells)]
@@ -196,14 +201,14 @@ class Script:
     def number(self, value: Fraction) -> str:
         """Return a number, exactly."""
         size = abs(value)
-        short = repr(float(size))
+        short = repr(float(min(size, _LARGEST)))
         if Fraction(short) == size and "e" not in short:
             text = short
         elif size.denominator == 1:
             text = f"{size}.0"
         else:
             text = f"(/ {size.numerator}.0 {size.denominator}.0)"
-            if Fraction(float(size)) == size and len(short) <= _DIGITS:
+            if Fraction(float(short)) == size and len(short) <= _DIGITS:
                 self._constants[short] = text
                 text = f"|{short}|"
         return f"(- {text})" if value < 0 else text
