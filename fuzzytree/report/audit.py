@@ -190,6 +190,9 @@ def proved_text(audit: Audit) -> list[str]:
     names = sorted({one.confirmed.split(" ")[0] for one in states} - {""})
     many = sum(one.confirmed != "" for one in states)
     by = f" by {' and '.join(names)}" if names else ""
+    for text in audit.unasked:
+        if text.startswith("FT901 "):
+            by += f" ({text.partition(': not asked: ')[2]})"
     return [f"{len(states)} PROVED, {many or 'none'} confirmed{by}"] if states else []
 
 

@@ -35,6 +35,7 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.rechecking import CannotRunError, model_text, recheck
 from fuzzytree.rechecking.case import strengths
 from fuzzytree.rechecking.models import Model
+from fuzzytree.report.audit import audit_verdict
 from fuzzytree.testing import random_tree
 from tests.auditing.decide.bases import random_base as mixed_base
 from tests.auditing.decide.old_bases import Kind, random_base, with_hidden_rule
@@ -220,9 +221,23 @@ def test_without_a_solver_proofs_stay_and_are_counted(
     result, content = audited(grip())
     states = [one.state for one in result.answers if isinstance(one.state, Proved)]
     assert {state.confirmed for state in states} == {"", "recheck"}
+    why = "no solver is at hand: install fuzzytree-toolkit[proofs]"
+    assert result.unasked[-1] == f"FT901 proof refuted: not asked: {why}"
+    assert f"5 confirmed by recheck ({why})" in audit_verdict(result)
     report = recheck(msgspec.json.encode(result), content, NAMES)
     assert (report.wrong, report.exit_code) == ([], 2)
     assert report.unconfirmed == 4
+
+
+def test_why_a_solver_confirms_nothing_is_in_the_audit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object) -> Any:
+        raise CannotRunError("z3 0: it fails: 'out of memory'")
+
+    monkeypatch.setattr("fuzzytree.rechecking.checks.ask", fail)
+    text = audit_verdict(audited(grip())[0])
+    assert "12 PROVED, none confirmed (z3 0: it fails: 'out of memory')" in text
 
 
 @pytest.mark.parametrize(

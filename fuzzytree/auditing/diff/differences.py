@@ -8,6 +8,7 @@ import msgspec
 
 from fuzzytree.auditing.decide import Budget
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
+from fuzzytree.auditing.decide.states import Proved
 from fuzzytree.auditing.diff.decisions import (
     Progress,
     RulePair,
@@ -30,7 +31,7 @@ from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
 from fuzzytree.auditing.findings.audit import source_of, with_confirmations
 from fuzzytree.auditing.findings.domains import Limits, Words, domain_of, limited
 from fuzzytree.auditing.findings.locations import ModelFile
-from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
+from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.errors import ReadError
 from fuzzytree.exporters import find_format
@@ -200,8 +201,20 @@ def _confirmed(result: Difference, models: tuple[Document, Document]) -> Differe
         names = "the comparison", "old.yaml", "new.yaml"
         return recheck_difference(result.to_json().encode(), old, new, names)
 
-    answers = with_confirmations(result.answers, confirmation)
+    answers, why = with_confirmations(result.answers, confirmation)
+    if why:
+        answers = tuple(_with_reason(answer, why) for answer in answers)
     return msgspec.structs.replace(result, answers=answers)
+
+
+def _with_reason(answer: AuditAnswer, why: str) -> AuditAnswer:
+    """Return an answer that says why nothing confirms it, if it is PROVED."""
+    state = answer.state
+    if not isinstance(state, Proved) or state.confirmed:
+        return answer
+    how = f"{state.how}; not confirmed: {why}"
+    state = msgspec.structs.replace(state, how=how)
+    return msgspec.structs.replace(answer, state=state)
 
 
 def _rule_pair(

@@ -59,6 +59,7 @@ _RAW = "not asked, as raw rules are another model; --select FT203 compares them"
 _RUNTIMES = "not asked, as `fuzzytree check` compares runtimes; --select FT6 asks"
 _ON_REQUEST = {"FT203": _RAW, "FT601": _RUNTIMES, "FT602": _RUNTIMES}
 _LATE = "FTD03"
+_NO_SOLVER = "no solver is at hand: install fuzzytree-toolkit[proofs]"
 _TOO_LARGE = "it needs more memory than there is"
 
 
@@ -127,10 +128,13 @@ def audit(
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
     subject_model = _audited(viewed, model)
     own_file = file if subject_model is model else None
-    confirmed = with_confirmations(
+    answers, why = with_confirmations(
         result.answers, lambda: confirm(*_for_solver(result, subject_model, own_file))
     )
-    result = replace(result, answers=confirmed)
+    unasked = result.unasked
+    if why:
+        unasked = (*unasked, f"FT901 {CODES['FT901'].title}: not asked: {why}")
+    result = replace(result, answers=answers, unasked=unasked)
     ids = {answer.id for answer in result.findings}
     accepted = tuple(sorted(ids.intersection(selection.accepted)))
     result = replace(result, accepted=accepted)
@@ -166,15 +170,17 @@ def _for_solver(
 
 def with_confirmations(
     answers: Sequence[AuditAnswer], confirmation: Callable[[], Report]
-) -> tuple[AuditAnswer, ...]:
-    """Return answers with what confirms each.
+) -> tuple[tuple[AuditAnswer, ...], str]:
+    """Return answers with what confirms each, and why nothing does if so.
 
     What it refutes is left out, and FT901 stands in its place.
     """
+    if not any(isinstance(one.state, Proved) for one in answers):
+        return (*answers,), ""
     try:
         report = confirmation()
-    except (LossError, CannotRunError):
-        return (*answers,)
+    except (LossError, CannotRunError) as error:
+        return (*answers,), str(error).partition("\n")[0]
     result: list[AuditAnswer] = []
     for place, answer in enumerate(answers):
         if isinstance(answer.state, Proved) and place in report.refuted:
@@ -194,7 +200,8 @@ def with_confirmations(
             state = replace(answer.state, confirmed=report.confirmed[place])
             answer = replace(answer, state=state)
         result.append(answer)
-    return tuple(sorted(result, key=lambda answer: answer.code))
+    why = _NO_SOLVER if report.unconfirmed else ""
+    return tuple(sorted(result, key=lambda answer: answer.code)), why
 
 
 def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
