@@ -14,7 +14,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.rechecking.case import Case
-from fuzzytree.rechecking.curves import ZERO, bounds, knots
+from fuzzytree.rechecking.curves import ZERO, bounds, turns
 from fuzzytree.rechecking.models import Rule
 from fuzzytree.rechecking.outcomes import DoesNotHoldError, UndecidedError, require
 from fuzzytree.rechecking.records import Answer, Proved, Span, Witness
@@ -374,7 +374,7 @@ def heights(case: Case, answer: Answer) -> Statements:
     for name, term in rest:
         variable = case.model.variables[name]
         curve, (low, high) = variable.curves[term], case.ends(variable)
-        ends = [low, high, *(x for x in knots(curve) if low < x < high)]
+        ends = [low, high, *(x for x in turns(curve) if low < x < high)]
         if all(bounds(curve, x, x)[0] < level for x in ends):
             degree = case.script.degree(variable, term)
             formula = f"(>= {degree} {case.script.number(level)})"

@@ -1,7 +1,7 @@
 """Membership functions: read from a file, and between which fractions degrees lie.
 
-Straight pieces are exact. Everything else is enclosed; both ends are rounded outwards,
-to 40 decimal digits, so they are certain.
+What consists of lines is exact. Everything else is enclosed; both ends are rounded
+outwards, to 40 decimal digits, so they are certain.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import functools
 import itertools
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from decimal import Context, Decimal
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -20,110 +20,96 @@ from fuzzytree.rechecking.outcomes import CannotRunError, UndecidedError
 ZERO, ONE = Fraction(0), Fraction(1)
 Facts = dict[str, Any]
 Between = tuple[Fraction, Fraction]
-STRAIGHT = ("band", "points", "trapezoid")
 CAP = 1 - Fraction(1, 2**53)  # the largest degree off a plateau
 _DIGITS = Context(prec=40)
 _PI = Fraction(31415926535897932384626433832795028841971693993751, 10**49)
 _FAR = 1000  # e**-1000 and less is enclosed by 0 and that
 
 
+class Knot(NamedTuple):
+    """A place of a function of lines: its value, and the limits on both sides.
+
+    The function is constant before the first and behind the last knot.
+    """
+
+    x: Fraction
+    before: Fraction
+    at: Fraction
+    after: Fraction
+
+
 class Curve(NamedTuple):
-    """A membership function: its kind and numbers, its height, and hedges."""
+    """A membership function: its kind and numbers, its height, and hedges.
+
+    The numbers of `lines` are knots; the height is in them.
+    """
 
     kind: str
     numbers: tuple[Any, ...]
     height: Fraction = ONE
     hedges: tuple[str, ...] = ()
 
+    @property
+    def top(self) -> Fraction:
+        """No degree is larger."""
+        return ONE if self.hedges else self.height
+
 
 def is_straight(curve: Curve) -> bool:
     """Return whether a curve consists of lines between its knots."""
-    return curve.kind in STRAIGHT and not curve.hedges
+    return curve.kind == "lines" and not curve.hedges
 
 
-def knots(curve: Curve) -> list[Fraction]:
-    """Return where a curve jumps or bends; of others where their formula changes."""
+def turns(curve: Curve) -> list[Fraction]:
+    """Return where a curve jumps, bends, or has another formula."""
     n = curve.numbers
-    if curve.kind == "points":
-        return sorted({*map(Fraction, n[0])})
+    if curve.kind == "lines":
+        return [knot.x for knot in n]
     if curve.kind == "lr":
-        sides = [Fraction(s) * k for s, _, r in n[1:] for k in (ONE, Fraction(r))]
-        signs = zip((-1, -1, 1, 1), sides, strict=True)
-        mean = Fraction(n[0])
-        return sorted([mean, *(mean + sign * far for sign, far in signs)])
+        mean, (left, _, reach), (right, _, other) = n
+        far = (-left * reach, -left, 0, right, right * other)
+        return [mean + x for x in far]
     if curve.kind in ("product", "difference"):
-        return sorted({x for part in n for x in knots(part)})
-    ends = [Fraction(end) for end in n if isinstance(end, float)]
-    if curve.kind == "band":
-        pairs = [(n[0], n[2]), (n[1], n[3])]
-        ends += [
-            Fraction(end) + CAP * (Fraction(top) - Fraction(end))
-            for top, end in pairs
-            if top is not None and end is not None
-        ]
-    if curve.kind == "trapezoid" and n[0] is not None and n[0] == n[1]:
-        ends.append(Fraction(math.nextafter(n[1], -math.inf)))  # 1 from there on
-    if curve.kind in ("s", "semi ellipse"):
-        ends.append((ends[0] + ends[1]) / 2)
-    return sorted({*ends})
+        return sorted({x for part in n for x in turns(part)})
+    ends = {*n, (n[0] + n[1]) / 2} if curve.kind in ("s", "semi ellipse") else {*n}
+    return [] if curve.kind == "formula" else sorted(ends)
 
 
 def bounds(curve: Curve, low: Fraction, high: Fraction) -> Between:
     """Return between which numbers the degrees of the values of an interval lie.
 
-    Of a straight curve the interval must be a point.
-
     Raises:
         UndecidedError: If the curve is not known here.
     """
-    if is_straight(curve) and low == high:
-        degree = curve.height * _straight(curve, low)
-        return degree, degree
-    if curve.kind in STRAIGHT:
-        inner = [x for x in knots(curve) if low < x < high]
-        ends = [low, *inner, high]
-        degrees = [_straight(curve, x) for x in ends]
-        for a, b in itertools.pairwise(ends):  # the limits at the ends of each line
-            p, q = (_straight(curve, (k * a + (3 - k) * b) / 3) for k in (2, 1))
-            degrees += [2 * p - q, 2 * q - p]
+    if curve.kind == "lines":
+        inner = [knot for knot in curve.numbers if low < knot.x < high]
+        (_, first, *start), (*end, last, _) = (
+            _sides(curve.numbers, x) for x in (low, high)
+        )
+        degrees = [first, last, *(y for _, *limits in inner for y in limits)]
+        degrees += [*start, *end] if low < high else []
         result = min(degrees), max(degrees)
     else:
         result = _enclosed(curve, low, high)
-    result = max(result[0], ZERO) * curve.height, min(result[1], ONE) * curve.height
+        result = max(result[0], ZERO) * curve.height, min(result[1], ONE) * curve.height
     for hedge in reversed(curve.hedges):
         result = _hedged(hedge, result)
     return result
 
 
-def _straight(curve: Curve, x: Fraction) -> Fraction:
-    """Return a straight curve's degree; a line beside a plateau is below 1."""
-    n = curve.numbers
-    if curve.kind == "points":
-        values, degrees = n
-        place = bisect_left(values, x)
-        if place in (0, len(values)):
-            return Fraction(degrees[min(place, len(values) - 1)])
-        return _line(x, values[place - 1 : place + 1], degrees[place - 1 : place + 1])
-    low, high, left, right = n
-    if curve.kind == "trapezoid":
-        left, low, high, right = n
-        if left is not None and x < low:
-            is_step = left == low and x > Fraction(math.nextafter(low, -math.inf))
-            return (
-                ONE if is_step else ZERO if x <= left else _line(x, (left, low), (0, 1))
-            )
-        if right is not None and x > high:
-            return ZERO if x >= right else _line(x, (high, right), (1, 0))
-        return ONE
-    end, top = (left, low) if low is not None and x <= low else (right, high)
-    if (low is None or x > low) and (high is None or x <= high):
-        return ONE
-    return ZERO if end is None else min(max(_line(x, (end, top), (0, 1)), ZERO), CAP)
-
-
-def _line(x: Fraction, ends: tuple[float, ...], degrees: tuple[float, ...]) -> Fraction:
-    a, b, p, q = map(Fraction, (*ends, *degrees))
-    return p + (q - p) * (x - a) / (b - a)
+def _sides(knots: tuple[Knot, ...], x: Fraction) -> tuple[Fraction, ...]:
+    """Return the limit before a place, the value there, and the limit behind it."""
+    place = bisect_left(knots, x, key=lambda knot: knot.x)
+    if place < len(knots) and knots[place].x == x:
+        return knots[place][1:]
+    if place == 0:
+        return (knots[0].before,) * 3
+    start = end = knots[place - 1]
+    if place < len(knots):
+        end = knots[place]
+        rise = (end.before - start.after) / (end.x - start.x)
+        return (start.after + rise * (x - start.x),) * 3
+    return (end.after,) * 3
 
 
 def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
@@ -134,9 +120,8 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
     """
     n = curve.numbers
     if curve.kind == "lr":
-        mean = Fraction(n[0])
-        left = _side(mean - high, mean - low, n[1])
-        right = _side(low - mean, high - mean, n[2])
+        left = _side(n[0] - high, n[0] - low, n[1])
+        right = _side(low - n[0], high - n[0], n[2])
         return min(left[0], right[0]), min(left[1], right[1])
     if curve.kind in ("product", "difference"):
         a, b = (_enclosed(part, low, high) for part in n)
@@ -146,29 +131,28 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
         return max(least, -most, ZERO), max(abs(least), abs(most))
     if curve.kind == "formula":
         raise UndecidedError("a curve (formula) is not evaluated here")
-    turns = [x for x in knots(curve) if low < x < high]
-    numbers = [*map(Fraction, n)]
-    degree: Callable[..., Between] = DEGREES.get(curve.kind, _bell)
-    ends = [degree(x, *numbers) for x in (low, *turns, high)]
+    degree = _CURVES[curve.kind][1]
+    inner = (x for x in turns(curve) if low < x < high)
+    ends = [degree(x, *n) for x in (low, *inner, high)]
     return min(end for end, _ in ends), max(end for _, end in ends)
 
 
 def _side(
-    low: Fraction, high: Fraction, side: tuple[float, tuple[float, ...], float]
+    low: Fraction, high: Fraction, side: tuple[Fraction, tuple[float, ...], Fraction]
 ) -> Between:
     """Return the degrees of a side of an LR set at distances from its mean."""
     if high <= 0:
         return ONE, ONE
-    spread, reach = Fraction(side[0]), Fraction(side[2])
+    spread, curve, reach = side
     u, v = (min(max(x / spread, ZERO), reach) for x in (low, high))
     a, b = min(u, ONE), min(v, ONE)
     least = most = (
-        sum((c * a**k for k, c in enumerate(body(side[1]))), start=ZERO)
+        sum((c * a**k for k, c in enumerate(_body(curve))), start=ZERO)
         if a == b
         else ZERO
     )
     if a < b:  # in doubles, of the distance from the middle
-        poly = [*map(float, body(side[1]))]
+        poly = [*map(float, _body(curve))]
         off = sum(map(abs, poly)) * 2.0**-36  # more than all rounding
         middle, half = float(a + b) / 2, float(b - a) / 2 + 2.0**-50
         for start in range(len(poly)):
@@ -184,7 +168,7 @@ def _side(
 
 
 @functools.lru_cache(maxsize=4096)
-def body(curve: tuple[float, ...]) -> tuple[Fraction, ...]:
+def _body(curve: tuple[float, ...]) -> tuple[Fraction, ...]:
     """Return the polynomial `1 - t (c0 + (2 t - 1) (c1 + ...))`, the lowest first."""
     poly: list[Fraction] = [ZERO]
     for c in reversed(curve):
@@ -284,6 +268,14 @@ def _concave(x: Fraction, inflection: Fraction, end: Fraction) -> Between:
     return (wide / far, wide / far) if far else (ONE, ONE)
 
 
+def _arc(x: Fraction, a: Fraction, b: Fraction) -> Between:
+    return _root(1 - (1 - _share((x - a) / (b - a))) ** 2)
+
+
+def _semi_ellipse(x: Fraction, a: Fraction, b: Fraction) -> Between:
+    return _root(1 - _share(abs(2 * x - a - b) / abs(b - a)) ** 2)
+
+
 def _exact(degree: Fraction) -> Between:
     return degree, degree
 
@@ -292,21 +284,26 @@ def _share(x: Fraction) -> Fraction:
     return min(max(x, ZERO), ONE)
 
 
-DEGREES: dict[str, Callable[[Fraction, Fraction, Fraction], Between]] = {
-    "gaussian": _gaussian,
-    "left half": lambda x, mean, d: _gaussian(min(x, mean), mean, d),
-    "right half": lambda x, mean, d: _gaussian(max(x, mean), mean, d),
-    "sigmoid": lambda x, inflection, slope: _logistic(slope * (x - inflection)),
-    "spike": lambda x, center, width: _falling(10 * abs(x - center) / width),
-    "s": lambda x, start, end: _exact(_s(x, start, end)),
-    "cosine": _cosine,
-    "concave": _concave,
-    "arc": lambda x, a, b: _root(1 - (1 - _share((x - a) / (b - a))) ** 2),
-    "semi ellipse": lambda x, a, b: _root(
-        1 - _share(abs(2 * x - a - b) / abs(b - a)) ** 2
+_CURVES: dict[str, tuple[str, Callable[..., Between]]] = {
+    "gaussian": ("mean, deviation", _gaussian),
+    "left half": (
+        "mean, deviation",
+        lambda x, mean, d: _gaussian(min(x, mean), mean, d),
     ),
+    "right half": (
+        "mean, deviation",
+        lambda x, mean, d: _gaussian(max(x, mean), mean, d),
+    ),
+    "bell": ("center, width, slope", _bell),
+    "sigmoid": ("inflection, slope", lambda x, at, slope: _logistic(slope * (x - at))),
+    "spike": ("center, width", lambda x, at, width: _falling(10 * abs(x - at) / width)),
+    "s": ("start, end", lambda x, start, end: _exact(_s(x, start, end))),
+    "cosine": ("center, width", _cosine),
+    "concave": ("inflection, end", _concave),
+    "arc": ("start, end", _arc),
+    "semi ellipse": ("start, end", _semi_ellipse),
 }
-"""Between which numbers a degree lies at a point; `_bell` has three numbers."""
+"""The names of a curve's numbers, and its degree at a point, enclosed."""
 
 _HEDGES: dict[str, Callable[[Fraction], Between]] = {
     "any": lambda d: (ONE, ONE),
@@ -336,20 +333,6 @@ def _hedged(hedge: str, degree: Between) -> Between:
 
 # --- from a file
 
-SHAPES = {
-    "gaussian": "mean, deviation",
-    "two gaussians": "left, left deviation, right, right deviation",
-    "bell": "center, width, slope",
-    "sigmoid": "inflection, slope",
-    "s": "start, end",
-    "cosine": "center, width",
-    "concave": "inflection, end",
-    "spike": "center, width",
-    "arc": "start, end",
-    "semi ellipse": "start, end",
-}
-"""The curves whose numbers have names, and these names in order."""
-
 
 def keys(facts: Facts, needed: str, optional: str = "") -> None:
     """Refuse facts that lack a key, or have another one.
@@ -363,8 +346,8 @@ def keys(facts: Facts, needed: str, optional: str = "") -> None:
         raise CannotRunError(f"missing or unknown: {', '.join(map(repr, wrong)):.200}")
 
 
-def number_of(value: Any) -> float:
-    """Return a finite number.
+def number_of(value: Any) -> Fraction:
+    """Return a finite number, as the double that it is.
 
     Raises:
         CannotRunError: If it is none.
@@ -372,7 +355,7 @@ def number_of(value: Any) -> float:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not math.isfinite(value):
         raise CannotRunError(f"no finite number: {value!r:.60}")
-    return float(value)
+    return Fraction(float(value))
 
 
 def curve_of(facts: Facts) -> Curve:
@@ -381,57 +364,113 @@ def curve_of(facts: Facts) -> Curve:
     Raises:
         CannotRunError: If it is not known here.
     """
-    height = Fraction(number_of(facts.pop("height", 1)))
+    height = number_of(facts.pop("height", 1))
     if facts == {"degree": 1}:
-        return Curve("band", (None,) * 4, height)
-    if "mean" in facts and facts.keys() & {"spread", "left"}:
+        curve = ANYTHING
+    elif "mean" in facts and facts.keys() & {"spread", "left"}:
         own = "left, right" if "left" in facts else "spread, curve, reach"
         keys(facts, f"mean, {own}")
-        sides = (facts.get(name, facts) for name in ("left", "right"))
-        return Curve("lr", (number_of(facts["mean"]), *map(_lr_side, sides)), height)
-    if facts and facts.keys() <= {"0 up to", "above", "up to", "0 from"}:
-        names = ("above", "up to", "0 up to", "0 from")
-        ends = tuple(None if n not in facts else number_of(facts[n]) for n in names)
-        _check_order((ends[2], ends[0], ends[1], ends[3]), is_strict=True)
-        return Curve("band", ends, height)
-    ((kind, data),) = facts.items()
-    return _curve(kind, data)._replace(height=height)
+        sides = (_lr_side(facts.get(name, facts)) for name in ("left", "right"))
+        curve = Curve("lr", (number_of(facts["mean"]), *sides))
+    elif facts and facts.keys() <= {*_ENDS}:
+        ends = [number_of(facts[n]) if n in facts else None for n in _ENDS]
+        _check_order(ends, is_strict=True)
+        curve = _plateau(ends, CAP)
+    else:
+        ((kind, data),) = facts.items()
+        curve = _curve(kind, data)
+    if curve.kind != "lines":
+        return curve._replace(height=height)
+    knots = (Knot(x, *(height * y for y in limits)) for x, *limits in curve.numbers)
+    return Curve("lines", (*knots,), height)
 
 
-def _lr_side(facts: Facts) -> tuple[float, tuple[float, ...], float]:
+def _lr_side(facts: Facts) -> tuple[Fraction, tuple[float, ...], Fraction]:
     spread, reach = number_of(facts["spread"]), number_of(facts["reach"])
     if spread <= 0 or reach <= 1 or not 1 <= len(facts["curve"]) <= 8:
         raise CannotRunError("a side of no set")
-    return spread, tuple(map(number_of, facts["curve"])), reach
+    return spread, tuple(float(number_of(c)) for c in facts["curve"]), reach
 
 
-def _check_order(ends: Iterable[float | None], *, is_strict: bool = False) -> None:
+def _check_order(ends: Iterable[Fraction | None], *, is_strict: bool = False) -> None:
     order = [end for end in ends if end is not None]
     if order != (sorted({*order}) if is_strict else sorted(order)):
         raise CannotRunError("a curve whose ends are swapped")
+
+
+def _lines(knots: Iterable[tuple[Fraction, ...]]) -> Curve:
+    """Return a function of lines; knots at one place become one."""
+    result: list[Knot] = []
+    for knot in itertools.starmap(Knot, knots):
+        if result and result[-1].x == knot.x:
+            knot = result.pop()._replace(after=knot.after)
+        result.append(knot)
+    return Curve("lines", (*result,))
+
+
+ANYTHING = _lines([(ZERO, ONE, ONE, ONE)])
+"""The curve whose degree is 1 everywhere."""
+
+_ENDS = ("0 up to", "above", "up to", "0 from")
+
+
+def _plateau(ends: Sequence[Fraction | None], cap: Fraction) -> Curve:
+    """Return a plateau above its second and up to its third end.
+
+    Lines rise to it from the first, and fall to the last one, up to a cap.
+    """
+    start, low, high, end = ends
+    knots: list[tuple[Fraction, ...]] = []
+    if low is not None:
+        if start is not None:
+            knots.append((start, ZERO, ZERO, ZERO))
+            knots.append((start + cap * (low - start), *[cap] * 3))
+        foot = ZERO if start is None else cap
+        knots.append((low, foot, foot, ONE))
+    if high is not None:
+        knots.append((high, ONE, ONE, ZERO if end is None else cap))
+        if end is not None:
+            knots.append((end + cap * (high - end), *[cap] * 3))
+            knots.append((end, ZERO, ZERO, ZERO))
+    return _lines(knots) if knots else ANYTHING
+
+
+def _trapezoid(left: Any, low: Fraction, high: Fraction, right: Any) -> Curve:
+    """Return a plateau between lines; one without width is 0 at the next double."""
+    start = None if left == -math.inf else left
+    end = None if right == math.inf else right
+    _check_order((start, low, high, end))
+    first: Fraction | None = None if start is None else low
+    if start == low:
+        start, first = None, Fraction(math.nextafter(float(low), -math.inf))
+    last = None if end is None else high
+    return _plateau((start, first, last, None if end == high else end), ONE)
 
 
 def _curve(kind: str, data: Any) -> Curve:
     if kind == "formula":
         return Curve(kind, (str(data),))
     if kind == "points":
-        values, degrees = (tuple(map(number_of, of)) for of in zip(*data, strict=True))
-        _check_order(values)
-        if not all(0 <= y <= 1 for y in degrees):
+        points = [(number_of(x), number_of(y)) for x, y in data]
+        _check_order(x for x, _ in points)
+        if not all(0 <= y <= 1 for _, y in points):
             raise CannotRunError("points that are no function")
-        return Curve(kind, (values, degrees))
-    if kind in SHAPES:
-        keys(data, SHAPES[kind])
-        numbers = {name: number_of(data[name]) for name in SHAPES[kind].split(", ")}
-        if any(
-            x <= 0 for n, x in numbers.items() if n.endswith(("width", "deviation"))
-        ):
+        return _lines((x, y, y, y) for x, y in points)
+    if kind == "two gaussians":
+        keys(data, "left, left deviation, right, right deviation")
+        halves = [
+            {"mean": data[side], "deviation": data[f"{side} deviation"]}
+            for side in ("left", "right")
+        ]
+        kinds = "left half", "right half"
+        return Curve("product", (*map(_curve, kinds, halves),))
+    if kind in _CURVES:
+        names = _CURVES[kind][0]
+        keys(data, names)
+        numbers = {name: number_of(data[name]) for name in names.split(", ")}
+        if any(numbers.get(name, 1) <= 0 for name in ("width", "deviation")):
             raise CannotRunError("a curve without width")
-        ends = (*numbers.values(),)
-        if kind == "two gaussians":
-            halves = Curve("left half", ends[:2]), Curve("right half", ends[2:])
-            return Curve("product", halves)
-        return Curve(kind, ends)
+        return Curve(kind, (*numbers.values(),))
     if kind in ("sigmoid difference", "sigmoid product"):
         first, second = (_curve("sigmoid", of) for of in data)
         return Curve(kind.removeprefix("sigmoid "), (first, second))
@@ -439,14 +478,11 @@ def _curve(kind: str, data: Any) -> Curve:
         a, b, c, d = map(number_of, data)
         return Curve("product", (Curve("s", (a, b)), Curve("s", (d, c))))
     if kind in ("trapezoid", "triangle"):
-        a, *inner, d = data
-        b, c = map(number_of, inner if kind == "trapezoid" else inner * 2)
-        left = None if a == -math.inf else number_of(a)
-        right = None if d == math.inf else number_of(d)
-        _check_order((left, b, c, right))
-        return Curve("trapezoid", (left, b, c, right))
+        a, *inner, d = (x if x in (-math.inf, math.inf) else number_of(x) for x in data)
+        b, c = inner if kind == "trapezoid" else inner * 2
+        return _trapezoid(a, b, c, d)
     if kind not in ("singleton", "at least", "at most"):
         raise CannotRunError(f"a curve ({kind:.60}) is not known")
     x = number_of(data)
-    left, right = None if kind == "at most" else x, None if kind == "at least" else x
-    return Curve("trapezoid", (left, x, x, right))
+    left = -math.inf if kind == "at most" else x
+    return _trapezoid(left, x, x, math.inf if kind == "at least" else x)

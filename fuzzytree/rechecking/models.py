@@ -9,6 +9,7 @@ from pathlib import PurePath
 from typing import Any, NamedTuple
 
 from fuzzytree.rechecking.curves import (
+    ANYTHING,
     ONE,
     ZERO,
     Curve,
@@ -270,7 +271,7 @@ class Model:
         self.names, self.numbers = list[str](), list[int]()
         self.thens: list[tuple[Is, ...]] = []
         for number, (name, block, rule, condition) in enumerate(owners, 1):
-            weight = Fraction(number_of(rule.get("weight", 1)))
+            weight = number_of(rule.get("weight", 1))
             then = read_conclusions(rule["then"])
             words = (
                 " ".join((c.variable, "is", *c.hedges, c.term or "")) for c in then
@@ -294,7 +295,7 @@ class Model:
         curves = {name: {**v.curves} for name, v in self.variables.items()}
         for name, term in _labels(rules):
             plain, *hedges = term.split("\0")
-            curve = curves[name][plain] if plain else Curve("band", (None,) * 4)
+            curve = curves[name][plain] if plain else ANYTHING
             curves[name][term] = curve._replace(hedges=tuple(hedges))
         variables = {n: v._replace(curves=curves[n]) for n, v in self.variables.items()}
         self.rules = Rules(variables, tuple(rules), self.is_product, None)
@@ -469,12 +470,12 @@ def _variable(facts: Facts) -> Variable:
     ends = facts.get("range", {})
     if ends.keys() - {"from", "to", "outside"}:
         raise CannotRunError("a range with other ends")
-    numbers = {k: number_of(ends[k]) for k in ("from", "to") if k in ends}
+    numbers = {k: float(number_of(ends[k])) for k in ("from", "to") if k in ends}
     inputs = [
         (
             part["input"],
-            Fraction(number_of(part["weight"])),
-            Fraction(number_of(part.get("centre", 0))),
+            number_of(part["weight"]),
+            number_of(part.get("centre", 0)),
         )
         for part in facts.get("sum of", [])
     ]
@@ -487,7 +488,7 @@ def _variable(facts: Facts) -> Variable:
         tuple(inputs),
         "outside" in ends,
         tuple(facts.get("categories", ())),
-        Fraction(number_of(facts["missing as"])) if "missing as" in facts else None,
+        number_of(facts["missing as"]) if "missing as" in facts else None,
         facts.get("numbers") == "whole",
     )
 

@@ -19,12 +19,20 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from types import MappingProxyType
-from typing import NamedTuple
 
-from fuzzytree.rechecking.curves import ONE, ZERO, Curve, bounds, is_straight, knots
+from fuzzytree.rechecking.curves import (
+    ONE,
+    ZERO,
+    Curve,
+    Knot,
+    bounds,
+    is_straight,
+    turns,
+)
 from fuzzytree.rechecking.models import Model, Proposition, Rule, Rules, Variable
 
 Ends = tuple[Fraction, Fraction]
+Knots = tuple[Knot, ...]
 CELLS, PARTS = 24, 8
 """Into so many cells a curve is cut, and each of them to find its error."""
 _DIGITS = 12  # of a double that is a constant of its own
@@ -44,37 +52,13 @@ MOST_WHOLE = 64
 """The most whole numbers that are listed one by one."""
 
 
-class Line(NamedTuple):
-    """A line through a point, `degree + slope (x - start)`."""
-
-    start: Fraction
-    degree: Fraction
-    slope: Fraction
-
-    def at(self, x: Fraction) -> Fraction:
-        """Return its value."""
-        return self.degree + self.slope * (x - self.start)
-
-
-class Lines(NamedTuple):
-    """A function of lines: one before each of `ends`, and one behind the last.
-
-    `values` are those at the ends, where it may jump.
-    """
-
-    lines: list[Line]
-    ends: list[Fraction]
-    values: list[Fraction]
-
-
-def lines_of(curve: Curve, low: Fraction, high: Fraction) -> tuple[Lines, Lines]:
+def lines_of(curve: Curve, low: Fraction, high: Fraction) -> tuple[Knots, Knots]:
     """Return functions of lines below and above a curve; the same one if it is lines.
 
     Between `low` and `high` they are near to it.
     """
     if is_straight(curve):
-        result = _straight(curve)
-        return result, result
+        return curve.numbers, curve.numbers
     part = (high - low) / CELLS
     bits = part.numerator.bit_length() - part.denominator.bit_length()
     step = Fraction(2) ** bits
@@ -82,54 +66,36 @@ def lines_of(curve: Curve, low: Fraction, high: Fraction) -> tuple[Lines, Lines]
     start, end = math.floor(low / step) + 1, math.ceil(high / step)
     cells = [low, *(k * step for k in range(start, end)), high]
     both = [_enclosed(curve, a, b) for a, b in itertools.pairwise(cells)]
-    outside = Line(low, ZERO, ZERO), Line(low, curve.height, ZERO)
     under, over = (
-        Lines(
-            [outside[side], *(pair[side] for pair in both), outside[side]],
-            cells,
-            [
-                *(pair[side].at(x) for pair, x in zip(both, cells, strict=False)),
-                both[-1][side].at(high),
-            ],
+        tuple(
+            Knot(x, before, before if x == high else after, after)
+            for x, before, after in zip(
+                cells,
+                [outside, *(pair[side][1] for pair in both)],
+                [*(pair[side][0] for pair in both), outside],
+                strict=True,
+            )
         )
-        for side in (0, 1)
+        for side, outside in ((0, ZERO), (1, curve.top))
     )
     return under, over
 
 
-def _straight(curve: Curve) -> Lines:
-    ends = knots(curve)
-    if not ends:
-        return Lines([Line(ZERO, bounds(curve, ZERO, ZERO)[0], ZERO)], [], [])
-    outside = ends[0] - 1, ends[-1] + 1
-    lines: list[Line] = []
-    for a, b in itertools.pairwise((outside[0], *ends, outside[1])):
-        (p, _), (q, _) = (
-            bounds(curve, x, x) for x in ((2 * a + b) / 3, (a + 2 * b) / 3)
-        )
-        lines.append(Line(a, 2 * p - q, 3 * (q - p) / (b - a)))
-    return Lines(lines, ends, [bounds(curve, x, x)[0] for x in ends])
-
-
-def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> tuple[Line, Line]:
-    """Return lines below and above a curve on an interval."""
+def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> tuple[Ends, Ends]:
+    """Return the ends of lines below and above a curve on an interval."""
     whole = bounds(curve, low, high)
     if whole[0] == whole[1]:
-        line = Line(low, whole[0], ZERO)
-        return line, line
+        return whole, whole
     p, q = (_rounded(bounds(curve, x, x)[0]) for x in (low, high))
-    line = Line(low, p, (q - p) / (high - low))
     under = over = ZERO
     for k in range(PARTS):
-        a, b = (low + (high - low) * (k + n) / PARTS for n in (0, 1))
-        least, most = bounds(curve, a, b)
-        ends = line.at(a), line.at(b)
+        a, b = (Fraction(k + n, PARTS) for n in (0, 1))
+        least, most = bounds(curve, low + (high - low) * a, low + (high - low) * b)
+        ends = p + (q - p) * a, p + (q - p) * b
         under, over = min(under, least - max(ends)), max(over, most - min(ends))
     off = Fraction(1, _GRID)
-    return (
-        line._replace(degree=_rounded(p + under) - off),
-        line._replace(degree=_rounded(p + over) + off),
-    )
+    below, above = _rounded(p + under) - off, _rounded(p + over) + off
+    return (below, below + q - p), (above, above + q - p)
 
 
 def _rounded(x: Fraction) -> Fraction:
@@ -289,7 +255,7 @@ class Script:
     def _enclose(self, variable: Variable, curve: Curve, name: str, own: str) -> str:
         """Declare the degree of a curve that is no line, with what is known of it."""
         self.is_exact = False
-        degree, height = self.symbol(name), self.number(curve.height)
+        degree, height = self.symbol(name), self.number(curve.top)
         self._lines.append(f"(declare-const {degree} Real) ; a curve that is no line")
         is_positive = False
         if curve.kind != "formula":
@@ -312,42 +278,39 @@ class Script:
         """Return where a curve that is no line is enclosed closely."""
         every = [*self._ends.get(variable.name, ())]
         if not every or every[0] == every[1]:
-            every += knots(curve) or [ZERO]  # beyond, nothing is known
+            every += turns(curve) or [ZERO]  # beyond, nothing is known
             wide = max(every) - min(every) or ONE
             every = [min(every) - 4 * wide, max(every) + 4 * wide]
         if variable.missing is not None:
             every.append(variable.missing)
         return min(every), max(every)
 
-    def _define(self, name: str, function: Lines) -> None:
+    def _define(self, name: str, function: Knots) -> None:
         head = f"(define-fun {self.symbol(name)} ((x Real)) Real"
         self._lines.append(f"{head}\n  {self._text(function)})")
 
-    def _text(self, function: Lines) -> str:
+    def _text(self, knots: Knots) -> str:
         """Return nested cases from the left to the right."""
-        lines, ends, values = function
-        cases: list[tuple[str, Fraction, str]] = []
-        for line, after, end, value in zip(
-            lines, lines[1:], ends, values, strict=False
-        ):
-            is_on = line.at(end) == value
-            is_one = line.slope == after.slope and is_on and after.at(end) == value
-            if is_one:
-                continue
-            cases.append(("<=" if is_on else "<", end, self._line(line)))
-            if not is_on and after.at(end) != value:
-                cases.append(("<=", end, self.number(value)))
-        text = self._line(lines[-1])
-        for sign, end, piece in reversed(cases):
-            text = f"(ite ({sign} x {self.number(end)}) {piece}\n  {text})"
+        lines = [self.number(knots[0].before)]
+        slopes = [ZERO]
+        for a, b in itertools.pairwise(knots):
+            slope = (b.before - a.after) / (b.x - a.x)
+            by = f"(* {self.number(slope)} (- x {self.number(a.x)}))"
+            text = f"(+ {self.number(a.after)} {by})" if a.after else by
+            lines.append(text if slope else self.number(a.after))
+            slopes.append(slope)
+        text = self.number(knots[-1].after)
+        slopes.append(ZERO)
+        for place in reversed(range(len(knots))):
+            x, before, at, after = knots[place]
+            if before == at == after and slopes[place] == slopes[place + 1]:
+                continue  # it changes nothing there
+            end = self.number(x)
+            if at not in (before, after):
+                text = f"(ite (<= x {end}) {self.number(at)}\n  {text})"
+            sign = "<=" if at == before else "<"
+            text = f"(ite ({sign} x {end}) {lines[place]}\n  {text})"
         return text
-
-    def _line(self, line: Line) -> str:
-        if not line.slope:
-            return self.number(line.degree)
-        start = line.start
-        by = f"(* {self.number(line.slope)} (- x {self.number(start)}))"
-        return f"(+ {self.number(line.degree)} {by})" if line.degree else by
 
     # --- rules
 
@@ -427,25 +390,28 @@ class Script:
                 continue
             name = f"{of}{variable.name} is {_words(term)}: {level} around"
             if ("zero", name) not in self._symbols:
-                flat = any_of(self._flat(_straight(curve), level))
+                flat = any_of(self._flat(curve.numbers, level))
                 head = f"(define-fun {self.symbol(name, 'zero')} ((x Real)) Bool"
                 self._lines.append(f"{head} {flat})")
             around = self.symbol(name, "zero")
             formulas.append(f"({around} {self.value(variable, of)})")
         return any_of(formulas) if proposition.negated else all_of(formulas)
 
-    def _flat(self, function: Lines, level: Fraction) -> Iterator[str]:
+    def _flat(self, knots: Knots, level: Fraction) -> Iterator[str]:
         """Yield the open intervals on which a function is at a level."""
-        lines, ends, values = function
-        is_flat = [not line.slope and line.degree == level for line in lines]
-        sides: list[str] = []
-        for place, is_on in enumerate(is_flat):
-            if is_on and place == len(ends):
-                yield all_of(sides)
-            elif is_on and not (values[place] == level and is_flat[place + 1]):
-                yield all_of([*sides, f"(< x {self.number(ends[place])})"])
-            if place < len(ends) and not (is_on and values[place] == level):
-                sides = [f"(< {self.number(ends[place])} x)"]
+        starts = [knots[0].before, *(knot.after for knot in knots)]
+        ends = [*(knot.before for knot in knots), knots[-1].after]
+        is_flat = [a == b == level for a, b in zip(starts, ends, strict=True)]
+        above: list[str] = []
+        for knot, is_before, is_after in zip(knots, is_flat, is_flat[1:], strict=False):
+            is_on = is_before and knot.at == level
+            x = self.number(knot.x)
+            if is_before and not (is_on and is_after):
+                yield all_of([*above, f"(< x {x})"])
+            if not is_on:
+                above = [f"(< {x} x)"]
+        if is_flat[-1]:
+            yield all_of(above)
 
     def text(self) -> str:
         """Return all but claims."""

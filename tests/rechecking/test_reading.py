@@ -14,7 +14,7 @@ from fuzzytree.exporters import yaml
 from fuzzytree.numerics import decide
 from fuzzytree.rechecking import CannotRunError, records, sentences
 from fuzzytree.rechecking.case import strengths
-from fuzzytree.rechecking.curves import bounds, is_straight, knots
+from fuzzytree.rechecking.curves import bounds, is_straight, turns
 from fuzzytree.rechecking.models import Model
 from fuzzytree.rechecking.records import built, read_json
 from fuzzytree.rechecking.yaml import read_yaml
@@ -171,7 +171,7 @@ def test_degrees_lie_in_what_encloses_them(seed: int) -> None:
     for variable in system.variables:
         for term in variable.terms:
             curve = found.variables[variable.name].curves[term.name]
-            places = [float(x) for x in knots(curve)] or [0.0]
+            places = [float(x) for x in turns(curve)] or [0.0]
             for _ in range(10):
                 ends = min(places) - 1.0, max(places) + 1.0
                 a, b = sorted(chance.uniform(*ends) for _ in range(2))
