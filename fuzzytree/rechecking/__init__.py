@@ -13,7 +13,7 @@ at hand.
 Read it in this order: how files become records and models (`records`, `words`, `yaml`,
 `sentences_of_rules`, `models`); degrees (`curves`); the text for solvers (`smt`);
 what a check needs (`case`); what is claimed (`claims`), who decides it (`solvers`),
-all other checks (`witnesses`, `checks`), and how they end (`outcomes`). `two_models`
+all other checks (`checks`), and how they end (`outcomes`). `two_models`
 checks what `diff` says; `sentences` reads those of an audit from `sentences.toml`.
 """
 
@@ -109,10 +109,7 @@ def recheck(
     check_source(report, case.file, model, names[1])
     try:
         check_head(result, case, report)
-        questions = _questions(case, report)
-        gaps = check_gaps(result, case)
-        if gaps is not None:
-            questions.append((case.answers.index(gaps[0]) + 1, *gaps))
+        questions = _questions(case, report) + check_gaps(result, case)
     except (DoesNotHoldError, UndecidedError) as error:
         report.wrong.append(str(error))
     except (LookupError, TypeError, ValueError):
@@ -121,7 +118,9 @@ def recheck(
     return report
 
 
-def _read(audit: bytes, model: bytes, names: tuple[str, str]) -> tuple[Audit, Case]:
+def _read(
+    audit: bytes, model: bytes, names: tuple[str, str] = ("the audit", "model.yaml")
+) -> tuple[Audit, Case]:
     result: Audit = built(Audit, read_json(audit, names[0]), names[0])
     left_out = [o.subject for o in result.answers if isinstance(o.state, Declined)]
     whole = Model(model, names[1], left_out)
@@ -136,8 +135,8 @@ def _read(audit: bytes, model: bytes, names: tuple[str, str]) -> tuple[Audit, Ca
 def _questions(case: Case, report: Report, kinds: type = object) -> Questions:
     """Return the claims of answers whose states are of a kind."""
     return [
-        (number, answer, check_answer(case, report, answer, number))
-        for number, answer in enumerate(case.answers, 1)
+        (place, check_answer(case, report, place))
+        for place, answer in enumerate(case.answers)
         if isinstance(answer.state, kinds)
     ]
 
@@ -152,7 +151,7 @@ def confirm(audit: bytes, model: bytes) -> Report:
     Raises:
         CannotRunError: If the model cannot be read, or the solver fails.
     """
-    _, case = _read(audit, model, ("the audit", "model.yaml"))
+    _, case = _read(audit, model)
     report = Report("", case.answers)
     decide(case.script, report, _questions(case, report, Proved), "")
     return report
@@ -164,10 +163,10 @@ def claims_text(audit: bytes, model: bytes) -> str:
     Raises:
         CannotRunError: If the model cannot be read.
     """
-    _, case = _read(audit, model, ("the audit", "model.yaml"))
+    _, case = _read(audit, model)
     every = [
-        claim._replace(text=f"{answer.code}: {claim.text}")
-        for _, answer, claims in _questions(case, Report("", case.answers), Proved)
+        claim._replace(text=f"{case.answers[place].code}: {claim.text}")
+        for place, claims in _questions(case, Report("", case.answers), Proved)
         for claim in claims
     ]
     return script_text(case.script.text(), every)

@@ -9,13 +9,16 @@ from fractions import Fraction
 from functools import cached_property
 
 from fuzzytree.rechecking.curves import ONE, ZERO, Between, bounds
-from fuzzytree.rechecking.models import Model, Point, Proposition, Rules, Variable
-from fuzzytree.rechecking.outcomes import (
-    DoesNotHoldError,
-    Report,
-    UndecidedError,
-    require,
+from fuzzytree.rechecking.models import (
+    Model,
+    Point,
+    Proposition,
+    Rule,
+    Rules,
+    Variable,
+    may_conflict,
 )
+from fuzzytree.rechecking.outcomes import DoesNotHoldError, UndecidedError, require
 from fuzzytree.rechecking.records import (
     Answer,
     Audit,
@@ -29,7 +32,7 @@ from fuzzytree.rechecking.smt import Script, all_of
 from fuzzytree.rechecking.words import value_word
 
 MOST_POINTS = 16
-Choice = Callable[[Iterable[Fraction]], Fraction]
+Pair = tuple[int, int]
 
 
 class Case:
@@ -47,7 +50,27 @@ class Case:
         sides = {side.variable: side for side in facts.domain.sides}
         self.sides = {n: side for n, side in sides.items() if n in model.variables}
         self.numbers = range(1, len(self.rules.rules) + 1)
+        self.inputs = [v.name for v in model.variables.values() if not v.parts]
         self._strengths: dict[tuple[object, ...], list[Between]] = {}
+
+    def ends(self, variable: Variable) -> tuple[Fraction, Fraction]:
+        """Return the values of a variable in the domain; of a sum, at most."""
+        side = self.sides.get(variable.name)
+        if variable.parts:
+            low = high = ZERO
+            for name, weight, centre in variable.parts:
+                every = self.ends(self.model.variables[name])
+                ends = sorted(weight * (end - centre) for end in every)
+                low, high = low + ends[0], high + ends[1]
+            if side is None:
+                return low, high
+            return max(low, Fraction(side.low)), min(high, Fraction(side.high))
+        if side is None:
+            raise DoesNotHoldError(f"the domain has no side {variable.name!r}")
+        values = [Fraction(side.low), Fraction(side.high), *side.points]
+        return min(values), max(values)
+
+    # --- the text for a solver
 
     @cached_property
     def script(self) -> Script:
@@ -64,16 +87,15 @@ class Case:
         script.add(self.model, ends, of, values)
 
     def reaches(self, number: int, sign: str, level: Fraction) -> str:
-        """Return that a rule's strength is `>` or `>=` a level, for a solver."""
-        rule = self.rules.rules[number - 1]
-        return self.script.reaches(rule, self.rules, sign, level)
+        """Return that a rule's strength is `>` or `>=` a level."""
+        return self.script.reaches(self.rule(number), self.rules, sign, level)
 
     def symbol(self, number: int) -> str:
-        """Return the strength of a rule, in the text for a solver."""
+        """Return the strength of a rule."""
         return self.script.symbol(self.name(number))
 
     def over(self, number: int, rivals: Iterable[int]) -> str:
-        """Return that a rule fires and is above rivals, for a solver."""
+        """Return that a rule fires and is above rivals."""
         own = self.symbol(number)
         above = (f"(> {own} {self.symbol(n)})" for n in rivals)
         return all_of([f"(> {own} 0.0)", *above])
@@ -87,97 +109,75 @@ class Case:
             formulas.append(f"({sign} {own} {symbols[n - 1]})")
         return all_of(formulas)
 
-    def ends(self, variable: Variable) -> tuple[Fraction, Fraction]:
-        """Return the values of a variable in the domain; of a sum, at most."""
-        side = self.sides.get(variable.name)
-        if variable.parts:
-            low = high = ZERO
-            for name, weight, centre in variable.parts:
-                every = self.ends(self.model.variables[name])
-                ends = sorted(weight * (end - centre) for end in every)
-                low, high = low + ends[0], high + ends[1]
-            if side is None:
-                return low, high
-            return max(low, Fraction(side.low)), min(high, Fraction(side.high))
-        if side is None:
-            raise DoesNotHoldError(f"the domain has no side {variable.name!r}")
-        stand_in = side.low if side.missing is None else side.missing
-        numbers = side.low, side.high, stand_in
-        return Fraction(min(numbers)), Fraction(max(numbers))
-
     # --- rules
+
+    def rule(self, number: int) -> Rule:
+        """Return a rule."""
+        return self.rules.rules[number - 1]
 
     def then(self, number: int) -> str:
         """Return the class of a rule."""
-        return self.rules.rules[number - 1].then
+        return self.rule(number).then
 
-    def name(self, number: int) -> str:
-        """Return what answers call a rule."""
-        return self.model.names[number - 1]
+    def name(self, *numbers: int) -> str:
+        """Return what answers call rules."""
+        return ", ".join(self.rule(number).name for number in numbers)
 
     def rivals(self, number: int) -> list[int]:
         """Return the rules of other classes."""
         return [n for n in self.numbers if self.then(n) != self.then(number)]
 
-    def own(self, label: object) -> list[int]:
-        """Return the rules of a class."""
-        return [n for n in self.numbers if self.then(n) == label]
-
-    def pairs(self, *, alike: bool | None = None) -> list[tuple[int, int]]:
+    def pairs(self, *, alike: bool | None = None) -> list[Pair]:
         """Return the pairs of rules, of one class or of two; not ways of one rule."""
-        of = self.model.numbers
         return [
             (a, b)
             for a, b in itertools.combinations(self.numbers, 2)
-            if of[a - 1] != of[b - 1] and alike in (None, self.then(a) == self.then(b))
+            if self.rule(a).number != self.rule(b).number
+            and alike in (None, self.then(a) == self.then(b))
         ]
 
-    def conflicts(self) -> set[tuple[int, int]]:
+    def conflicts(self) -> set[Pair]:
         """Return the pairs of rules that say different things of one output."""
         pairs = self.pairs(alike=False)
-        return {pair for pair in pairs if self.model.may_conflict(*pair)}
+        return {(a, b) for a, b in pairs if may_conflict(self.rule(a), self.rule(b))}
 
-    def coded(self, start: str) -> list[Answer]:
+    def answers_of(self, *starts: str) -> list[Answer]:
         """Return the answers whose message begins so."""
-        return [o for o in self.answers if o.message.startswith(start)]
+        return [o for o in self.answers if o.message.startswith(starts)]
 
     def live(self) -> set[int]:
         """Return the rules that no answer says never to fire."""
-        dead = [*self.coded("FT101.never-fires"), *self.coded("FT107.silent")]
-        numbers = {self.model.numbers[o.rules[0] - 1] for o in dead if o.rules}
-        return {n for n in self.numbers if self.model.numbers[n - 1] not in numbers}
+        dead = self.answers_of("FT101.never-fires", "FT107.silent")
+        numbers = {self.rule(o.rules[0]).number for o in dead if o.rules}
+        return {n for n in self.numbers if self.rule(n).number not in numbers}
 
-    @cached_property
-    def samples(self) -> list[tuple[Point, list[Between]]]:
-        """Witnesses and other points of the domain, with the strengths of all rules."""
-        points = [
-            {c.input: fraction(c.exact) for c in answer.state.point}
-            for answer in self.answers
-            if isinstance(answer.state, Witness)
-        ]
-        chance = random.Random(0)
-        for _ in range(MOST_POINTS):
-            point = {}
-            for name in self.inputs:
-                low, high = self.ends(self.model.variables[name])
-                point[name] = low + (high - low) * Fraction(
-                    chance.randrange(1025), 1024
-                )
-            points.append(point)
-        is_whole = {*self.inputs}
-        points = [p for p in points if p.keys() == is_whole and self.is_within(p)]
-        return [(point, strengths(self.rules, point)) for point in points]
-
-    def is_above(self, number: int, other: int) -> bool:
-        """Return whether a rule is above another one at some sample."""
-        return any(s[number - 1][0] > s[other - 1][1] for _, s in self.samples)
+    def live_pairs(self, *, alike: bool) -> list[Pair]:
+        """Return the pairs of rules that may fire, of one class or of two."""
+        live = self.live()
+        return [pair for pair in self.pairs(alike=alike) if live.issuperset(pair)]
 
     # --- points
 
-    @property
-    def inputs(self) -> list[str]:
-        """The names of the inputs."""
-        return [v.name for v in self.model.variables.values() if not v.parts]
+    @cached_property
+    def samples(self) -> list[list[Between]]:
+        """The strengths of all rules at witnesses and other points of the domain."""
+        states = (answer.state for answer in self.answers)
+        points = [
+            {c.input: fraction(c.exact) for c in state.point}
+            for state in states
+            if isinstance(state, Witness)
+        ]
+        chance = random.Random(0)
+        for _ in range(MOST_POINTS):
+            point: dict[str, Fraction] = {}
+            for name in self.inputs:
+                low, high = self.ends(self.model.variables[name])
+                share = Fraction(chance.randrange(1025), 1024)
+                point[name] = low + (high - low) * share
+            points.append(point)
+        whole = {*self.inputs}
+        points = [p for p in points if p.keys() == whole and self.is_within(p)]
+        return [strengths(self.rules, point) for point in points]
 
     def is_within(self, point: Point) -> bool:
         """Return whether a row of the domain can be this point."""
@@ -197,7 +197,7 @@ class Case:
         return point
 
     def check_point(
-        self, report: Report, coordinates: Sequence[Coordinate], claims: Sequence[Claim]
+        self, coordinates: Sequence[Coordinate], claims: Sequence[Claim]
     ) -> Point:
         """Return a point of the domain at which the claims hold."""
         point = self.point_of(coordinates)
@@ -205,16 +205,10 @@ class Case:
             entries = zip(claim._fields, claim, strict=True)
             text = ", ".join(f"{name} {value}" for name, value in entries if value)
             require(self.holds(claim, point), f"not so: {text}")
-            report.counts["claims evaluated again"] += 1
         return point
 
     def holds(self, claim: Claim, point: Point) -> bool:
-        """Return whether a claim holds at a point, evaluated in fractions.
-
-        Raises:
-            DoesNotHoldError: If it is no claim about this model.
-            UndecidedError: If two numbers are too near to distinguish.
-        """
+        """Return whether a claim holds at a point, evaluated in fractions."""
         fields = {n for n, value in zip(claim._fields, claim, strict=True) if value}
         alien = fields - {"kind", "of", *FIELDS[claim.kind].split(" ")}
         require(not alien, f"a claim of kind {claim.kind} has no {', '.join(alien)}")
@@ -227,29 +221,20 @@ class Case:
                 return self.model.leaves[self.model.leaf_at(point) - 1] == claim.label
             return class_at(rules, point) == claim.label
         require(claim.of != "tree", "a tree has no strengths")
-        level = ZERO if claim.level is None else fraction(claim.level)
         is_so = (claim.level is None) is ("level" not in FIELDS[claim.kind])
         require(is_so, "a claim without its level")
-        if claim.kind == "degree":
-            variable = rules.variables.get(claim.variable or "")
-            if variable is None or claim.term not in variable.curves:
-                raise DoesNotHoldError("a claim of an unknown term")
-            x = variable.at(point)
-            low, high = bounds(variable.curves[claim.term], x, x)
-            return low <= level <= high
+        level = ZERO if claim.level is None else fraction(claim.level)
         key = claim.of, *sorted(point.items())
         if key not in self._strengths:
             self._strengths[key] = strengths(rules, point)
         every = self._strengths[key]
         is_there = all(1 <= n <= len(every) for n in (*claim.rules, *claim.rivals))
         require(is_there, "a claim of an unknown rule")
-        require(bool(claim.rules) or claim.kind == "covered", "a claim of no rule")
-        ours = [every[n - 1] for n in claim.rules] or every
+        require(bool(claim.rules), "a claim of no rule")
+        ours = [every[n - 1] for n in claim.rules]
         rivals = [(ZERO, ZERO), *(every[n - 1] for n in claim.rivals)]
         least, most, top = _ends(min, ours), _ends(max, ours), _ends(max, rivals)
         match claim.kind:
-            case "covered":
-                return less((ZERO, ZERO), most)
             case "beats":
                 return less(top, least)  # alone: it fires
             case "ties":
@@ -263,7 +248,20 @@ class Case:
                 return least[0] >= level or not less(least, (level, level))
 
 
-def _ends(choose: Choice, of: list[Between]) -> Between:
+FIELDS = {
+    "strength": "rules level",
+    "beats": "rules rivals",
+    "ties": "rules rivals",
+    "below": "rules level",
+    "reaches": "rules level",
+    "decides": "label",
+}
+"""What each kind of claim is about."""
+
+
+def _ends(
+    choose: Callable[[Iterable[Fraction]], Fraction], of: list[Between]
+) -> Between:
     """Return the least, or the most, of the lower and of the upper ends."""
     return choose(low for low, _ in of), choose(high for _, high in of)
 
@@ -280,19 +278,6 @@ def values_of(coordinates: Sequence[Coordinate]) -> dict[str, Fraction]:
         require(c.input not in point, f"{c.input!r} stands twice in the point")
         point[c.input] = value
     return point
-
-
-FIELDS = {
-    "strength": "rules level",
-    "beats": "rules rivals",
-    "ties": "rules rivals",
-    "below": "rules level",
-    "reaches": "rules level",
-    "decides": "label",
-    "degree": "level variable term",
-    "covered": "",
-}
-"""What each kind of claim is about."""
 
 
 def less(lower: Between, upper: Between) -> bool:
@@ -336,9 +321,9 @@ def class_at(rules: Rules, point: Point) -> str | None:
     best = max(result)
     if best[1] == 0:
         return rules.uncovered
-    first = result.index(best)
+    then = rules.rules[result.index(best)].then
     for rule, strength in zip(rules.rules, result, strict=True):
         is_exact = strength == best and best[0] == best[1]
-        if rule.then != rules.rules[first].then and not is_exact:
+        if rule.then != then and not is_exact:
             less(strength, best)
-    return rules.rules[first].then
+    return then

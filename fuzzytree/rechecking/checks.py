@@ -5,17 +5,19 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from fractions import Fraction
 from statistics import NormalDist
 from typing import Any
 
 from fuzzytree.rechecking.case import Case
 from fuzzytree.rechecking.claims import (
-    BOUNDS,
-    PROVABLE,
+    BRACKETS,
+    PROOFS,
+    WITNESSES,
     Statement,
-    no_more_gaps,
-    statements,
+    no_gap,
+    not_decided,
 )
 from fuzzytree.rechecking.outcomes import Report, UndecidedError, require
 from fuzzytree.rechecking.records import (
@@ -28,13 +30,13 @@ from fuzzytree.rechecking.records import (
     Proved,
     Sampled,
     Source,
+    Span,
     Witness,
     fraction,
 )
 from fuzzytree.rechecking.sentences import LIMITS, MESSAGES, sentence_of
 from fuzzytree.rechecking.smt import Script
 from fuzzytree.rechecking.solvers import ask
-from fuzzytree.rechecking.witnesses import SHOWS, check_spans, check_witness
 from fuzzytree.rechecking.words import stretch_word
 
 FREE_CODES = {"FT801", "FT802", "FT901", "FTD"}
@@ -48,8 +50,8 @@ UNCHECKED = (
 )
 """What of an audit is read and compared with nothing."""
 
-Questions = list[tuple[int, Answer, list[Statement]]]
-"""The number of each answer that a solver must decide, and its claims."""
+Questions = list[tuple[int, list[Statement]]]
+"""The position of each answer that a solver must decide, and its claims."""
 
 
 def digest_of(facts: Mapping[str, Any]) -> str:
@@ -82,27 +84,23 @@ def check_head(audit: Audit, case: Case, report: Report) -> None:
     )
     expect(audit.policy == policy, "the policy is not the model's")
     expect(audit.limits == LIMITS, "the panel of limits is not the fixed one")
-    settings = audit.settings
     for name in ("epsilon", "margin", "lead", "level", "overlap"):
-        is_share = 0 < getattr(settings, name) <= 1
+        is_share = 0 < getattr(audit.settings, name) <= 1
         expect(is_share, f"the setting {name} is not in (0, 1]")
-    expect(1 <= settings.rows <= 10**7, "the setting rows is not in 1 to 10,000,000")
-    expect(0 <= settings.seed < 2**32, "the setting seed is not in 0 to 2**32 - 1")
-    expect(0 < settings.budget <= 1e9, "the budget is not in (0, 1e9] million steps")
-    _domain(audit, case, report)
+    _check_domain(audit, case, report)
     ids = {answer.id for answer in audit.answers if answer.is_finding}
-    findings = sorted(ids.intersection(audit.accepted))
-    expect([*audit.accepted] == findings, "a finding is accepted that there is not")
-    is_plain = model.numbers == [*range(1, len(model.numbers) + 1)]
+    is_finding = [*audit.accepted] == sorted(ids.intersection(audit.accepted))
+    expect(is_finding, "a finding is accepted that there is not")
+    numbers = tuple(rule.number for rule in case.rules.rules)
+    numbers = () if numbers == (*case.numbers,) else numbers
     text = "the numbers of rules in the file are not those of the system"
-    expect(audit.numbers == (() if is_plain else tuple(model.numbers)), text)
+    expect(audit.numbers == numbers, text)
     expect(audit.rows > 0 or audit.data is None, "a table is named without rows")
-    if not case.coded("FT901."):  # which stands in the place of a refuted answer
-        report.wrong += _questions(audit, case)
-    report.counts["facts about the audit"] += 12
+    if not case.answers_of("FT901."):  # which stands in the place of a refuted answer
+        report.wrong += _omissions(audit, case)
 
 
-def _domain(audit: Audit, case: Case, report: Report) -> None:
+def _check_domain(audit: Audit, case: Case, report: Report) -> None:
     variables = case.model.variables
     order = [name for name in variables if name in case.sides]
     is_plain = [side.variable for side in audit.domain.sides] == order
@@ -116,17 +114,17 @@ def _domain(audit: Audit, case: Case, report: Report) -> None:
         is_part = {*side.values} <= {*codes} and bool(side.values) == bool(codes)
         is_part &= side.values[:1] + side.values[-1:] in ((), (side.low, side.high))
         is_chosen = side.origin in ("data", "limits")
-        word = (
-            "" if variable.parts else stretch_word(variable, side, *case.ends(variable))
-        )
+        word = ""
+        if not variable.parts:
+            word = stretch_word(variable, side, *case.ends(variable))
         low, high = variable.low, variable.high
-        if variable.is_whole and low is not None and high is not None:
-            low, high = float(math.ceil(low)), float(math.floor(high))
-        is_range = (side.low, side.high) == (low, high)
-        is_range |= side.origin != "model" or bool(codes) or variable.is_clipped
         is_inside = low is None or low <= side.low
         is_inside &= high is None or side.high <= high
         is_inside |= not variable.is_clipped or bool(variable.parts)
+        if variable.is_whole and low is not None and high is not None:
+            low, high = math.ceil(low), math.floor(high)
+        is_range = (side.low, side.high) == (low, high)
+        is_range |= side.origin != "model" or bool(codes) or variable.is_clipped
         stand_ins = (variable.missing, None) if is_chosen else (variable.missing,)
         for is_so, what in (
             (side.low <= side.high, "has swapped ends"),
@@ -141,78 +139,59 @@ def _domain(audit: Audit, case: Case, report: Report) -> None:
             report.expect(is_so, f"the side of {name!r} {what}")
 
 
-def _questions(audit: Audit, case: Case) -> Iterator[str]:
+def _omissions(audit: Audit, case: Case) -> Iterator[str]:
     """Yield what lacks an answer, and is not listed as left out."""
     codes = [answer.code for answer in case.answers]
     if codes != sorted(codes):
         yield "the answers are not in the order of their codes"
-    ends = [
-        (answer.repeat, f" --select {answer.facts.get('code', answer.code)}")
-        for answer in case.answers
-    ]
-    starts = {text.removesuffix(end) for text, end in ends}
-    is_same = starts <= {""} or all(text.endswith(end) for text, end in ends)
-    if not is_same or len(starts) > 1:
-        yield "the commands that find it again differ"
-    reasons = {text.split(" ")[0]: text for text in audit.unasked}
-    if [text.split(" ")[0] for text in audit.unasked] != sorted(reasons):
-        yield "the list of what was left out is not in order"
-    is_cut = any(
-        ": cut short: " in text or text.endswith(("is spent", "interrupted"))
-        for text in audit.unasked
-    )
-    if audit.is_complete == is_cut:
+    left_out = {text.split(" ")[0] for text in audit.unasked}
+    ends = ("is spent", "interrupted")
+    cut = [o for o in audit.unasked if ": cut short: " in o or o.endswith(ends)]
+    if audit.is_complete == bool(cut):
         yield "is_complete is not what was left out says"
-    for code in sorted({name.partition(".")[0] for name in MESSAGES} - FREE_CODES):
-        if code not in codes and code not in reasons:
-            yield f"{code} is neither answered nor listed as left out"
-    for code, text in reasons.items():
-        is_left = text.endswith(("left out by the user", "that it applies to"))
-        if code in codes and (is_left or ": not run: " in text):
-            yield f"{code} is answered, and listed as left out"
-    for code, items in _items(case).items():
-        answers = case.coded(f"{code}.")
-        is_open = code in reasons or any(
-            "declined" in o.message or "not-listed" in o.message
-            for o in case.coded(code)
-        )
-        is_open |= len(case.numbers) == 1 or (code == "FT102" and "FT101" in reasons)
-        if (
-            not is_open
-            and answers
-            and items != {o.rules[0] for o in answers if o.rules}
-        ):
+    every = {name.partition(".")[0] for name in MESSAGES} - FREE_CODES
+    for code in sorted(every - {*codes} - left_out):
+        yield f"{code} is neither answered nor listed as left out"
+    for code, items in _rules_by_code(case).items():
+        answers = case.answers_of(f"{code}.")
+        messages = [o.message for o in case.answers_of(code)]
+        is_open = any("declined" in o or "not-listed" in o for o in messages)
+        is_open |= code in left_out or (code == "FT102" and "FT101" in left_out)
+        is_open |= len(case.numbers) == 1 or not answers
+        if not is_open and items != {o.rules[0] for o in answers if o.rules}:
             yield f"{code} has not one answer for each rule"
-    silent = sorted(o.subject for o in case.coded("FT101.") if not o.rules)
-    is_system = case.model.form == "system"
-    if is_system and silent != sorted(case.model.silent) and "FT101" not in reasons:
+    silent = sorted(o.subject for o in case.answers_of("FT101.") if not o.rules)
+    is_silent = case.model.form != "system" or silent == sorted(case.model.silent)
+    if not is_silent and "FT101" not in left_out:
         yield "other rules never fire, as their text says"
-    lengths = [len(rule.when) for rule in case.rules.rules]
-    answers = [o for o in case.coded("FT107.") if o.rules or o.measures]
-    count = sum(
-        o.measures[0].value
-        if o.measures
-        else lengths[o.rules[0] - 1]
-        if "silent" in o.message
-        else 1
-        for o in answers
-    )
-    if case.coded("FT107.") and "FT107" not in reasons and count != sum(lengths):
+    answers = case.answers_of("FT107.")
+    total = sum(len(rule.when) for rule in case.rules.rules)
+    is_whole = sum(_propositions(case, o) for o in answers) == total
+    if answers and "FT107" not in left_out and not is_whole:
         yield "FT107 has not one answer for each proposition"
-    for code, rest in _rest(case).items():
-        answers = case.coded(f"{code}.")
+    for code, rest in _pairs_by_code(case).items():
+        answers = case.answers_of(f"{code}.")
         is_closed = any(not o.rules for o in answers) or not (rest and answers)
-        if not is_closed and code not in reasons:
+        if not is_closed and code not in left_out:
             yield f"{code} says nothing of all that it does not list"
-    messages = [answer.message for answer in case.coded("FT301.")]
-    if messages == ["FT301.fires"] and "FT301" not in reasons:
+    messages = [answer.message for answer in case.answers_of("FT301.")]
+    if messages == ["FT301.fires"] and "FT301" not in left_out:
         yield "FT301 says nothing of how strong the strongest rule is"
 
 
-def _items(case: Case) -> dict[str, set[int]]:
+def _propositions(case: Case, answer: Answer) -> float:
+    """Return of how many propositions an answer is."""
+    if answer.measures:
+        return answer.measures[0].value
+    is_silent = answer.message == "FT107.silent"
+    return len(case.rule(answer.rules[0]).when) if is_silent else len(answer.rules)
+
+
+def _rules_by_code(case: Case) -> dict[str, set[int]]:
     """Return the rules that codes have an answer each for."""
     every = {*case.numbers}
-    dead = {o.rules[0] for o in case.coded("FT101.") if o.is_finding and o.rules}
+    answers = case.answers_of("FT101.")
+    dead = {o.rules[0] for o in answers if o.is_finding and o.rules}
     if case.model.form == "tree":
         return {"FT101": dead, "FT103": every, "FT205": every - dead}
     if case.model.form == "system":
@@ -220,47 +199,43 @@ def _items(case: Case) -> dict[str, set[int]]:
     return {"FT101": every, "FT102": every - dead, "FT103": every}
 
 
-def _rest(case: Case) -> dict[str, Any]:
+def _pairs_by_code(case: Case) -> dict[str, Collection[tuple[int, int]]]:
     """Return the pairs of rules of codes that list some, and end with the rest."""
-    alike, apart = (case.pairs(alike=is_alike) for is_alike in (True, False))
-    listed = {answer.rules for answer in case.coded("FT201.")}
-    rest: dict[str, Any] = {
-        "FT104": [pair for pair in alike if {*pair} <= case.live()],
+    listed = {answer.rules for answer in case.answers_of("FT201.")}
+    rest: dict[str, Collection[tuple[int, int]]] = {
+        "FT104": case.live_pairs(alike=True),
         "FT106": case.pairs(),
         "FT201": case.conflicts() - listed,
     }
     if case.model.form != "system":
-        rest["FT105"] = [pair for pair in apart if {*pair} <= case.live()]
-        rest["FT202"] = apart
+        rest["FT105"] = case.live_pairs(alike=False)
+        rest["FT202"] = case.pairs(alike=False)
     return rest
 
 
-def check_gaps(audit: Audit, case: Case) -> tuple[Answer, list[Statement]] | None:
+def check_gaps(audit: Audit, case: Case) -> Questions:
     """Return the claim that there are no more gaps than the listed ones."""
-    gaps = case.coded("FT301.gap")
+    gaps = case.answers_of("FT301.gap")
     is_open = any(text.startswith("FT301 ") for text in audit.unasked)
-    is_open |= bool(case.coded("FT301.more"))
+    is_open |= bool(case.answers_of("FT301.more"))
     if not gaps or is_open or any(not gap.region for gap in gaps):
-        return None
-    return gaps[-1], [no_more_gaps(case, gaps)]
+        return []
+    return [(case.answers.index(gaps[-1]), [no_gap(case, gaps)])]
 
 
 # --- one answer
 
 
-def check_answer(
-    case: Case, report: Report, answer: Answer, number: int
-) -> list[Statement]:
+def check_answer(case: Case, report: Report, place: int) -> list[Statement]:
     """Check everything about an answer, and return what a solver must decide."""
-    with report.answer(number, answer):
+    with report.answer(place) as answer:
         check_message(answer)
-        _words(case, answer)
-        report.counts["sentences written again"] += 1
-        _names(case, report, answer)
-        check_spans(case, answer.region)
-        claims = _state(case, report, answer)
+        _check_words(case, answer)
+        _check_names(case, answer)
+        _check_spans(case, answer.region)
+        claims = _check_state(case, report, answer)
         if isinstance(answer.state, Proved) and not claims:
-            report.confirm(number, "recheck")
+            report.confirm(place, "recheck")
         return claims
     return []
 
@@ -279,7 +254,7 @@ def check_message(answer: Answer) -> None:
     require(answer.sentence == sentence_of(answer), "its sentence says something else")
 
 
-def _words(case: Case, answer: Answer) -> None:
+def _check_words(case: Case, answer: Answer) -> None:
     """Check the subject of an answer, and its facts."""
     is_share = answer.code == "FT701" and answer.message != "FT701.rule"
     if is_share and isinstance(answer.state, Sampled):
@@ -288,11 +263,9 @@ def _words(case: Case, answer: Answer) -> None:
     subjects = _subjects(case, answer)
     require(answer.subject in subjects, f"it is of {subjects[0]}")
     others = answer.message in ("FT104.others", "FT105.others", "FT106.others")
-    listed = sum(o.is_finding for o in case.coded(answer.code)) if others else 0
-    require(
-        not others or bool(listed) == ("listed" in answer.facts),
-        "whether others are listed",
-    )
+    listed = sum(o.is_finding for o in case.answers_of(answer.code)) if others else 0
+    is_so = not others or bool(listed) == ("listed" in answer.facts)
+    require(is_so, "whether others are listed")
     facts = _facts(case, answer) | {"listed": listed}
     for name, fact in answer.facts.items():
         is_so = name not in facts or facts[name] == fact
@@ -307,7 +280,7 @@ def _subjects(case: Case, answer: Answer) -> list[str]:
     if answer.message in ("FT301.weak", "FT301.reaches"):
         return [f"cover of {case.settings.epsilon:g}"]
     if answer.message.startswith("FT301.gap"):
-        gaps = [gap.id for gap in case.coded("FT301.gap")]
+        gaps = [gap.id for gap in case.answers_of("FT301.gap")]
         return [f"gap {gaps.index(answer.id) + 1}"]
     if len(names) == 2 and answer.code in ("FT106", "FT201", "FT202"):
         return [" and ".join(names)]
@@ -321,20 +294,20 @@ def _subjects(case: Case, answer: Answer) -> list[str]:
 def _facts(case: Case, answer: Answer) -> dict[str, Any]:
     """Return what the facts of an answer must be, by their names."""
     settings, code = case.settings, answer.code
-    noun = "conclusion" if case.model.form == "system" else "class"
+    is_system = case.model.form == "system"
     facts: dict[str, Any] = {
         **{n: getattr(settings, n) for n in ("epsilon", "margin", "lead", "overlap")},
-        "nouns": "conclusions" if noun == "conclusion" else "classes",
+        "nouns": "conclusions" if is_system else "classes",
     }
     if code not in ("FT601", "FT602", "FT701"):  # whose noun is of rows
-        facts["noun"] = noun
+        facts["noun"] = "conclusion" if is_system else "class"
     if code != "FT201" or not answer.rules:
         facts["level"] = settings.level
-    thens = [case.then(n) for n in answer.rules]
     if code in ("FT104", "FT105"):
         for n in answer.rules[1:2]:
             facts |= {"then": case.then(n), "by": case.name(n)}
     elif code != "FT103":
+        thens = map(case.then, answer.rules)
         facts |= dict(zip(("then", "other"), thens, strict=False))
     if code == "FT203":
         facts.pop("other", None)
@@ -345,10 +318,10 @@ def _facts(case: Case, answer: Answer) -> dict[str, Any]:
     return facts
 
 
-def _names(case: Case, report: Report, answer: Answer) -> None:
+def _check_names(case: Case, answer: Answer) -> None:
     """Check the rules, terms, measures, units and places that an answer names."""
     model = case.model
-    is_there = all(n in case.numbers for n in answer.rules)
+    is_there = {*answer.rules} <= {*case.numbers}
     require(is_there, "it is of a rule that there is not")
     raw = model.raw.variables.values() if model.raw else ()
     variables = [*model.variables.values(), *case.rules.variables.values(), *raw]
@@ -361,11 +334,10 @@ def _names(case: Case, report: Report, answer: Answer) -> None:
         if measure.exact is not None:
             text = f"{measure.name}: {measure.exact:.60} is not {measure.value!r}"
             require(float(fraction(measure.exact)) == measure.value, text)
-            report.counts["exact measures"] += 1
     if case.file is None:
         require(not answer.places, "a place in no file")
         return
-    own = [model.numbers[n - 1] for n in answer.rules]
+    own = [case.rule(n).number for n in answer.rules]
     if not own and answer.subject in model.absent:
         own = [model.absent[answer.subject]]
     places = [model.places[n - 1] for n in own]
@@ -377,47 +349,81 @@ def _names(case: Case, report: Report, answer: Answer) -> None:
     require(is_file, "a place that is not in the audited file")
 
 
-def _state(case: Case, report: Report, answer: Answer) -> list[Statement]:
+def _check_spans(case: Case, region: tuple[Span, ...]) -> None:
+    """Refuse a region of unknown variables, with swapped ends or in other words."""
+    for span in region:
+        variable = case.model.variables.get(span.variable)
+        require(variable is not None, f"no variable {span.variable!r}")
+        is_ordered = span.low is None or span.high is None or span.low <= span.high
+        require(is_ordered, f"the region's ends in {span.variable!r} are swapped")
+        word = ""
+        if variable is not None and not variable.parts:
+            low, high = case.ends(variable)
+            low = low if span.low is None else Fraction(span.low)
+            high = high if span.high is None else Fraction(span.high)
+            word = stretch_word(variable, case.sides.get(span.variable), low, high)
+        require(span.word == word, f"{span.variable!r} is {word!r}, not {span.word!r}")
+
+
+def _check_state(case: Case, report: Report, answer: Answer) -> list[Statement]:
     """Check a state, and return what a solver must decide."""
     state, name = answer.state, answer.message
     kind = type(state).__name__.upper()
-    if isinstance(state, Proved | Computed):
-        require(bool(state.how), f"it is {kind}, without how")
-        if isinstance(state, Proved):
-            return statements(case, answer)
-        report.counts["answers COMPUTED, not decided again"] += 1
-        return []
+    if isinstance(state, Proved):
+        require(bool(state.how), "it is PROVED, without how")
+        return [*PROOFS.get(name, not_decided)(case, answer)]
     if isinstance(state, Declined):
         is_reason = state.code in {f"FTD0{n}" for n in range(1, 9)}
         require(is_reason and bool(state.reason), "declined, and not for a reason")
         require(not answer.is_finding, "what is declined is no finding")
         report.counts["answers DECLINED"] += 1
         return []
-    is_free = name not in PROVABLE or name.endswith((".others", ".leaves"))
+    is_free = name not in PROOFS or name.endswith((".others", ".leaves"))
     is_free |= isinstance(state, Bracket) and answer.code == "FT403"
+    is_free |= isinstance(state, Computed) and answer.code == "FT402"
     require(is_free, f"it must be PROVED, and is {kind}")
+    if isinstance(state, Witness):
+        _check_witness(case, answer, state)
+        check = WITNESSES.get(name) or BRACKETS.get(name)
+        claims = [*check(case, answer)] if check else []
+        report.counts["answers with a WITNESS, evaluated again"] += 1
+        return claims
+    require(name not in WITNESSES, "it needs a witness")
+    if isinstance(state, Computed):
+        require(bool(state.how), "it is COMPUTED, without how")
+        report.counts["answers COMPUTED, not decided again"] += 1
+        return []
     if isinstance(state, Sampled):
         check_sample(state)
-    bounds = [*BOUNDS[name](case, answer)] if name in BOUNDS else []
-    if isinstance(state, Witness):
-        check_witness(case, report, answer, state)
-        report.counts["answers with a WITNESS, evaluated again"] += 1
-        return bounds
-    require(name not in SHOWS, "it needs a witness")
     require(state.low <= state.high, "the ends of the bracket are swapped")
     if isinstance(state, Bracket) and (state.point or state.claims):
-        case.check_point(report, state.point, state.claims)
-    if not bounds:
+        case.check_point(state.point, state.claims)
+    if name not in BRACKETS:
         raise UndecidedError("a bracket is not computed again here")
-    return bounds
+    return [*BRACKETS[name](case, answer)]
+
+
+def _check_witness(case: Case, answer: Answer, state: Witness) -> None:
+    """Check the claims of a witness at its point, and its region."""
+    point = case.check_point(state.point, state.claims)
+    is_same = answer.region in ((), state.region)
+    require(is_same, "the answer's region is not that of its witness")
+    require(bool(state.claims), "a witness of which nothing is claimed")
+    levels = [claim for claim in state.claims if claim.kind == "strength"]
+    if levels and answer.rules:  # of the first rule of the answer that is so strong
+        same = (levels[0]._replace(rules=(n,)) for n in answer.rules)
+        first = next((claim for claim in same if case.holds(claim, point)), None)
+        require(levels[0] == first, "the strength of another rule is claimed")
+    _check_spans(case, state.region)
+    for span in state.region:
+        x = case.model.variables[span.variable].at(point)
+        is_in = span.low is None or span.low <= x
+        is_in &= span.high is None or x <= span.high
+        require(is_in, f"the witness lies outside its region in {span.variable!r}")
 
 
 def check_sample(state: Sampled) -> None:
-    """Check that an interval is Wilson's; the sample itself is not drawn again.
-
-    Raises:
-        UndecidedError: If it is.
-    """
+    """Check that an interval is Wilson's; the sample itself is not drawn again."""
     require(0 <= state.hits <= state.rows and state.rows > 0, "no share of rows")
     require(0.0 < state.confidence < 1.0, "a confidence outside (0, 1)")
     z = NormalDist().inv_cdf((1.0 + state.confidence) / 2.0)
@@ -436,34 +442,25 @@ def check_sample(state: Sampled) -> None:
 
 
 def decide(script: Script, report: Report, questions: Questions, solver: str) -> None:
-    """Ask a solver for all claims, and note which answers it confirms.
-
-    Raises:
-        CannotRunError: If the solver fails.
-    """
-    every = [claim for *_, claims in questions for claim in claims]
+    """Ask a solver for all claims, and note which answers it confirms."""
+    every = [claim for _, claims in questions for claim in claims]
     if not every and not solver:
         return
     results = ask(script.text(), every, solver)
     replies = iter(results.answers)
-    for number, answer, claims in questions:
+    for place, claims in questions:
         pairs = [(claim, next(replies)) for claim in claims]
+        is_proof = isinstance(report.answers[place].state, Proved)
         if pairs and not results.solver:
-            report.unconfirmed += isinstance(answer.state, Proved)
+            report.unconfirmed += is_proof
         elif pairs:
-            with report.answer(number, answer):
+            with report.answer(place):
                 _judge(pairs, is_exact=script.is_exact)
-                is_bound = not isinstance(answer.state, Proved)
-                report.confirm(number, results.solver, is_bound=is_bound)
+                report.confirm(place, results.solver, is_bound=not is_proof)
 
 
 def _judge(results: list[tuple[Statement, str]], *, is_exact: bool) -> None:
-    """Compare what a solver answers with what proves each claim.
-
-    Raises:
-        DoesNotHoldError: If it refutes one.
-        UndecidedError: If it leaves one open, or refutes only bounds of it.
-    """
+    """Compare what a solver answers with what proves each claim."""
     reasons: list[str] = []
     for claim, result in results:
         is_certain = result == "unsat" or (result == "sat" and is_exact)

@@ -1,8 +1,10 @@
-"""What a PROVED answer says of all of the domain, as claims that a solver decides.
+"""What each answer says, as claims that a solver decides, and what its witness shows.
 
-A claim is written from an answer's message, rules, facts and measures, never from its
-sentence. Most are asserted as their contrary, and `unsat` proves them; a claim that
-something exists is asserted as it is, unless a known point shows it.
+A function of `CHECKS` checks what reading and evaluating can decide of an answer, and
+yields the rest as claims. They are written from an answer's message, rules, facts and
+measures, never from its sentence. Most are asserted as their contrary, and `unsat`
+proves them; a claim that something exists is asserted as it is, unless a known point
+shows it.
 """
 
 from __future__ import annotations
@@ -13,17 +15,23 @@ from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.rechecking.case import Case
+from fuzzytree.rechecking.case import Case, class_at, strengths
 from fuzzytree.rechecking.curves import ZERO, bounds, turns
 from fuzzytree.rechecking.models import Rule
 from fuzzytree.rechecking.outcomes import DoesNotHoldError, UndecidedError, require
-from fuzzytree.rechecking.records import Answer, Proved, Span, Witness
+from fuzzytree.rechecking.records import (
+    Answer,
+    Claim,
+    Proved,
+    Span,
+    Witness,
+    fraction,
+)
 from fuzzytree.rechecking.smt import all_of, any_of
+from fuzzytree.rechecking.words import is_plain
 
 NEARLY = Fraction(1, 10**6)
-_ROUNDED = Fraction(1, 10**9)
-_MOST = 5000
-"""The most claims of an answer."""
+ROUNDED = Fraction(1, 10**9)
 
 
 class Statement(NamedTuple):
@@ -46,27 +54,36 @@ class Statement(NamedTuple):
 Statements = Iterator[Statement]
 
 
-def statements(case: Case, answer: Answer) -> list[Statement]:
-    """Return the claims of an answer; none if reading the model decides it.
-
-    Raises:
-        DoesNotHoldError: If the answer is not so.
-        UndecidedError: If no solver of lines and polynomials can decide it.
-    """
-    if answer.message not in CLAIMS:
-        raise UndecidedError("no solver of lines and polynomials is asked for it")
-    claims = CLAIMS[answer.message](case, answer)
-    result = [*itertools.islice(claims, _MOST + 1)]
-    if len(result) > _MOST:
-        raise UndecidedError(f"more than {_MOST:,} claims")
-    return result
-
-
-def _names(case: Case, numbers: Iterable[int]) -> str:
-    return ", ".join(map(case.name, numbers))
+def witness_claims(answer: Answer, kind: str) -> list[Claim]:
+    """Return what is claimed of a kind at the point of an answer."""
+    return [claim for claim in answer.witness.claims if claim.kind == kind]
 
 
 # --- rules that win, lead, fire, or are needed
+
+
+def wins(case: Case, answer: Answer) -> Statements:
+    """Check that a rule beats all rivals at a point, or fires there, or leads."""
+    (number,) = answer.rules
+    rivals = () if answer.message == "FT101.fires" else case.rivals(number)
+    is_all = any(
+        claim.rules == (number,) and {*claim.rivals} == {*rivals}
+        for claim in witness_claims(answer, "beats")
+    )
+    require(is_all, "it is not claimed that the rule beats all these others")
+    if answer.code == "FT102":
+        every = _strengths(case, answer)
+        lead = every[number - 1] - max((every[n - 1] for n in rivals), default=ZERO)
+        least = answer.measure("largest lead, at least")
+        is_so = least >= case.settings.lead and lead >= Fraction(least)
+        require(is_so, "the rule does not lead by so much there")
+    yield from ()
+
+
+def _strengths(case: Case, answer: Answer) -> list[Fraction]:
+    """Return the strengths of all rules at a witness, at most."""
+    point = case.point_of(answer.witness.point)
+    return [most for _, most in strengths(case.rules, point)]
 
 
 def never_wins(case: Case, answer: Answer) -> Statements:
@@ -76,15 +93,14 @@ def never_wins(case: Case, answer: Answer) -> Statements:
     if isinstance(answer.state, Proved) and answer.state.rivals:
         require({*answer.state.rivals} <= {*rivals}, "a rival that is none")
         rivals = [*answer.state.rivals]
-    text = f"{case.name(number)} is nowhere stronger than {_names(case, rivals)}"
+    text = f"{case.name(number)} is nowhere stronger than {case.name(*rivals)}"
     yield Statement(text, case.over(number, rivals))
 
 
 def never_fires(case: Case, answer: Answer) -> Statements:
     """Claim that a rule is 0 everywhere, in each of its ways."""
-    of = case.model.numbers
     for number in case.numbers:
-        if of[number - 1] == of[answer.rules[0] - 1]:
+        if case.rule(number).number == case.rule(answer.rules[0]).number:
             text = f"{case.name(number)} never fires"
             yield Statement(text, case.reaches(number, ">", ZERO))
 
@@ -98,17 +114,98 @@ def silent(case: Case, answer: Answer) -> Statements:
 def no_lead(case: Case, answer: Answer) -> Statements:
     """Claim that a rule leads nowhere by as much as the largest lead, at most."""
     (number,) = answer.rules
-    lead = Fraction(answer.measure("largest lead, at most")) + _ROUNDED
-    own, rivals = case.symbol(number), case.rivals(number)
+    lead = Fraction(answer.measure("largest lead, at most")) + ROUNDED
+    own, by = case.symbol(number), case.script.number(lead)
+    over = [f"(> {own} (+ {by} {case.symbol(n)}))" for n in case.rivals(number)]
     text = f"{case.name(number)} leads nowhere by {float(lead):g}"
-    by = case.script.number(lead)
-    over = [f"(> {own} (+ {by} {case.symbol(n)}))" for n in rivals]
     yield Statement(text, all_of([f"(> {own} {by})", *over]))
+
+
+def ties(case: Case, answer: Answer) -> Statements:
+    """Check that a claim compares rules that tie with all others."""
+    every, own = {*case.numbers}, {*answer.rules}
+    if answer.code == "FT101":  # others of its class do not matter
+        every = own | {*case.rivals(answer.rules[0])}
+    is_all = any(
+        own <= {*claim.rules} and every <= {*claim.rules, *claim.rivals}
+        for claim in witness_claims(answer, "ties")
+    )
+    require(is_all, "it is not claimed that they tie above all others")
+    is_two = answer.code != "FT202" or len({*map(case.then, answer.rules)}) == 2
+    require(is_two, "the rules are of one class")
+    yield from ()
+
+
+def without(case: Case, answer: Answer) -> Rule:
+    """Return the rule of an answer without the proposition that it is about."""
+    rule = case.rule(answer.rules[0])
+    labels = [tuple(label) for label in answer.terms]
+    for place, proposition in enumerate(rule.when):
+        is_it = [(proposition.variable, term) for term in proposition.terms] == labels
+        if is_it and answer.facts.get("proposition") == str(proposition):
+            return rule._replace(when=(*rule.when[:place], *rule.when[place + 1 :]))
+    raise DoesNotHoldError("it is of no proposition of the rule")
+
+
+def needed(case: Case, answer: Answer) -> Statements:
+    """Check that without a rule, or a proposition, another class is predicted."""
+    point, place = case.point_of(answer.witness.point), answer.rules[0] - 1
+    rest = [without(case, answer)] if answer.code == "FT107" else []
+    every = (*case.rules.rules[:place], *rest, *case.rules.rules[place + 1 :])
+    before = class_at(case.rules, point)
+    after = class_at(case.rules._replace(rules=every), point)
+    own = after if rest else before
+    require(before != after and own == case.then(place + 1), "it does not matter there")
+    require(answer.facts.get("before") == before, f"the class there is {before!r}")
+    require(answer.facts.get("then") == after, f"it becomes {after!r}")
+    yield from ()
+
+
+def not_needed(case: Case, answer: Answer) -> Statements:
+    """Claim that the same is decided without a rule, or one of its propositions."""
+    (number,) = answer.rules
+    own = [*map(case.symbol, case.numbers)]
+    others, name = [*own], f"a model without {case.name(number)}"
+    if answer.code == "FT107":  # its rest takes no input from another class
+        name = f"{case.name(number)} without {answer.facts['proposition']}"
+        rest = case.script.add_rule(name, without(case, answer), case.rules)
+        own[number - 1] = rest
+    else:
+        others[number - 1] = "0.0"
+    for is_strict in (True, False):
+        yield unchanged(name, number, (case, own), (case, others), is_strict=is_strict)
+
+
+Model = tuple[Case, list[str]]
+
+
+def unchanged(
+    name: str, number: int, old: Model, new: Model, *, is_strict: bool
+) -> Statement:
+    """Claim that where a rule of a model decides, no other class of another one does.
+
+    Apart from exact ties, or also where rules tie.
+    """
+    (case, own), (other, strengths_of_other) = old, new
+    then = case.then(number)
+    ways = [
+        other.wins(n, strengths_of_other, is_strict=is_strict)
+        for n in other.numbers
+        if other.then(n) != then
+    ]
+    if other.rules.uncovered != then and (case is other or not is_strict):
+        ways.append(all_of(f"(<= {strength} 0.0)" for strength in strengths_of_other))
+    formula = all_of([case.wins(number, own, is_strict=is_strict), any_of(ways)])
+    tail = ", apart from exact ties" if is_strict else ""
+    return Statement(f"{name} decides the same{tail}", formula, is_sure=is_strict)
+
+
+# --- trees
 
 
 def path_to(case: Case, number: int) -> str:
     """Return that the nodes of a tree lead to a leaf."""
-    formulas = []
+    formulas: list[str] = []
     for node, place in case.model.paths[number - 1]:
         own = case.script.value(case.model.variables[node["ask"]])
         cuts = [case.script.number(Fraction(cut)) for cut in node["cuts"]]
@@ -129,26 +226,61 @@ def dead_leaf(case: Case, answer: Answer) -> Statements:
 
 def live_leaves(case: Case, answer: Answer) -> Statements:
     """Claim that values lead to each leaf without a finding."""
-    dead = {o.rules[0] for o in case.coded("FT101.leaf-")}
-    count = len(case.numbers)
-    is_so = (answer.facts["live"], answer.facts["leaves"]) == (count - len(dead), count)
+    live = {*case.numbers} - {o.rules[0] for o in case.answers_of("FT101.leaf-")}
+    counts = len(live), len(case.numbers)
+    is_so = (answer.facts["live"], answer.facts["leaves"]) == counts
     require(is_so, "other leaves are reached")
-    for number in {*case.numbers} - dead:
+    for number in live:
         text = f"values lead to leaf {number}"
         yield Statement(text, path_to(case, number), "sat")
+
+
+def leaf_region(case: Case, answer: Answer) -> Statements:
+    """Check that a witness reaches its leaf; claim that all of its region does."""
+    (number,), state = answer.rules, answer.witness
+    is_there = case.model.leaf_at(case.point_of(state.point)) == number
+    require(is_there, "the witness reaches another leaf")
+    label = case.model.leaves[number - 1]
+    require([c.label for c in state.claims] == [label], "it is not the leaf's class")
+    ends: dict[str, set[float | None]] = {}
+    for node, _ in case.model.paths[number - 1]:
+        ends.setdefault(node["ask"], set()).update(node["cuts"])
+    is_path = {span.variable for span in state.region} == ends.keys()
+    require(is_path, "not the variables of its path")
+    for span in state.region:
+        side = case.sides.get(span.variable)
+        if side is not None:
+            both = {span.low, span.high}
+            is_end = both <= ends[span.variable] | {side.low, side.high}
+            if not is_plain(side):
+                is_end = all(side.has(Fraction(end)) for end in both if end is not None)
+            require(is_end, f"the path leads elsewhere in {span.variable!r}")
+    yield from _in_region(case, answer, f"(not {path_to(case, number)})")
+
+
+def raw_rules_differ(case: Case, answer: Answer) -> Statements:
+    """Check that a tree and its raw rules are claimed to answer differently."""
+    classes = {c.of: c.label for c in witness_claims(answer, "decides")}
+    is_both = classes.keys() == {"tree", "raw rules"}
+    require(is_both, "it is not claimed what both answer")
+    both = classes["tree"], classes["raw rules"]
+    require(both[0] != both[1], "the two answers are the same")
+    is_so = (answer.facts["then"], answer.facts["other"]) == both
+    require(is_so, "the two answer something else")
+    yield from ()
 
 
 def same_class(case: Case, answer: Answer) -> Statements:
     """Claim that one class is decided everywhere, apart from exact ties."""
     label = answer.facts.get("then")
-    own = case.own(label)
+    own = [n for n in case.numbers if case.then(n) == label]
     others = (case.over(n, own) for n in case.numbers if n not in own)
     yield Statement(f"no class is decided but {label!r}", any_of(others))
     if case.rules.uncovered != label:
-        yield _no_gap(case)
+        yield no_gap(case)
 
 
-# --- pairs of rules, and propositions
+# --- pairs of rules
 
 
 def hidden(case: Case, answer: Answer) -> Statements:
@@ -166,26 +298,26 @@ def hidden(case: Case, answer: Answer) -> Statements:
 
 def no_other_hidden(case: Case, answer: Answer) -> Statements:
     """Claim that each rule of other pairs is somewhere the stronger one."""
-    is_alike, live = answer.code == "FT104", case.live()
-    pairs = [pair for pair in case.pairs(alike=is_alike) if {*pair} <= live]
+    is_alike = answer.code == "FT104"
+    pairs = case.live_pairs(alike=is_alike)
     if answer.measure("pairs") != len(pairs):
         raise UndecidedError("which rules never fire is not known")
-    listed = case.coded("FT104.sub") if is_alike else case.coded("FT105.")
-    hides = {(o.rules[0], n) for o in listed for n in o.rules[1:]}
+    answers = case.answers_of("FT104.sub" if is_alike else "FT105.")
+    hides = {(o.rules[0], n) for o in answers for n in o.rules[1:]}
     for pair in pairs:
         if pair in hides or pair[::-1] in hides:
             continue
         for weak, strong in (pair, pair[::-1]) if is_alike else (pair,):
-            if not case.is_above(strong, weak):
+            samples = [(every[weak - 1], every[strong - 1]) for every in case.samples]
+            if not any(high[0] > low[1] for low, high in samples):
                 text = f"{case.name(strong)} is somewhere above {case.name(weak)}"
-                is_sure = any(every[strong - 1][0] > 0 for _, every in case.samples)
+                is_sure = any(high[0] > 0 for _, high in samples)
                 yield Statement(text, case.over(strong, [weak]), "sat", is_sure)
 
 
 def _apart(case: Case, a: int, b: int) -> str:
     """Return that the degrees of two rules differ on some axis."""
-    rules = [case.rules.rules[n - 1] for n in (a, b)]
-    axes = [case.script.on_axes(rule, case.rules) for rule in rules]
+    axes = [case.script.on_axes(case.rule(n), case.rules) for n in (a, b)]
     off = case.script.number(NEARLY)
     both = [[of.get(n, "1.0") for of in axes] for n in {**axes[0], **axes[1]}]
     every = [(p, q) for x, y in both if x != y for p, q in ((x, y), (y, x))]
@@ -196,108 +328,77 @@ def same(case: Case, answer: Answer) -> Statements:
     """Claim that two rules have nearly the same antecedent."""
     is_same = case.then(answer.rules[0]) == case.then(answer.rules[1])
     require(is_same is (answer.message == "FT106.same"), "the classes are not so")
-    text = f"the degrees of {_names(case, answer.rules)} differ nowhere by 1e-6"
+    text = f"the degrees of {case.name(*answer.rules)} differ nowhere by 1e-6"
     yield Statement(text, _apart(case, *answer.rules))
 
 
 def no_others_same(case: Case, answer: Answer) -> Statements:
     """Claim that the antecedents of all other pairs differ."""
-    off = len(case.model.variables) * NEARLY if case.rules.is_product else NEARLY
-    for a, b in sorted({*case.pairs()} - {o.rules for o in case.coded("FT106.")}):
-        sides = [(s[a - 1], s[b - 1]) for _, s in case.samples]
-        if all(x[0] <= y[1] + off and y[0] <= x[1] + off for x, y in sides):
+    is_product = case.rules.is_product
+    off = len(case.model.variables) * NEARLY if is_product else NEARLY
+    for a, b in sorted({*case.pairs()} - {o.rules for o in case.answers_of("FT106.")}):
+        samples = [(every[a - 1], every[b - 1]) for every in case.samples]
+        if all(x[0] <= y[1] + off and y[0] <= x[1] + off for x, y in samples):
             text = f"{case.name(a)} and {case.name(b)} differ somewhere"
-            is_sure = not case.rules.is_product
-            yield Statement(text, _apart(case, a, b), "sat", is_sure)
-
-
-def without(case: Case, answer: Answer) -> Rule:
-    """Return the rule of an answer without the proposition that it is about."""
-    rule = case.rules.rules[answer.rules[0] - 1]
-    labels = [tuple(label) for label in answer.terms]
-    for place, proposition in enumerate(rule.when):
-        is_it = [(proposition.variable, term) for term in proposition.terms] == labels
-        if is_it and answer.facts.get("proposition") == str(proposition):
-            return rule._replace(when=(*rule.when[:place], *rule.when[place + 1 :]))
-    raise DoesNotHoldError("it is of no proposition of the rule")
-
-
-def irrelevant(case: Case, answer: Answer) -> Statements:
-    """Claim that a rule without a proposition takes no input from another class."""
-    (number,) = answer.rules
-    name = f"{case.name(number)} without {answer.facts['proposition']}"
-    symbols = [*map(case.symbol, case.numbers)]
-    rest = case.script.add_rule(name, without(case, answer), case.rules)
-    others = [*symbols[: number - 1], rest, *symbols[number:]]
-    yield from _unchanged(case, number, others, symbols, name)
-
-
-def superfluous(case: Case, answer: Answer) -> Statements:
-    """Claim that no input has another class without a rule."""
-    (number,) = answer.rules
-    symbols = [*map(case.symbol, case.numbers)]
-    others = [*symbols[: number - 1], "0.0", *symbols[number:]]
-    name = f"a model without {case.name(number)}"
-    yield from _unchanged(case, number, symbols, others, name)
-
-
-def _unchanged(
-    case: Case, number: int, own: list[str], others: list[str], name: str
-) -> Statements:
-    """Claim that where a rule decides by some strengths, its class does by others.
-
-    First apart from exact ties; then also where rules tie.
-    """
-    bare = all_of(f"(<= {strength} 0.0)" for strength in others)
-    for is_strict in (True, False):
-        ways = [case.wins(n, others, is_strict=is_strict) for n in case.rivals(number)]
-        ways += [bare] * (case.rules.uncovered != case.then(number))
-        formula = all_of([case.wins(number, own, is_strict=is_strict), any_of(ways)])
-        tail = ", apart from exact ties" if is_strict else ""
-        text = f"{name} decides the same{tail}"
-        yield Statement(text, formula, is_sure=is_strict)
+            yield Statement(text, _apart(case, a, b), "sat", not is_product)
 
 
 def apart(case: Case, answer: Answer) -> Statements:
     """Claim that no pair without a finding reaches the level together."""
     level = Fraction(case.settings.level)
-    rest = case.conflicts() - {o.rules for o in case.coded("FT201.")}
+    rest = case.conflicts() - {o.rules for o in case.answers_of("FT201.")}
     omitted = int(answer.measure("pairs not listed"))
-    _count(answer, "pairs that never do", len(rest) - omitted)
+    _check_count(answer, "pairs that never do", len(rest) - omitted)
     if omitted:
         raise UndecidedError("which pairs are left out is not known")
     for pair in sorted(rest):
-        formula = all_of(case.reaches(n, ">=", level) for n in pair)
-        text = f"{_names(case, pair)} never reach {float(level):g} together"
-        yield Statement(text, formula)
+        text = f"{case.name(*pair)} never reach {float(level):g} together"
+        yield Statement(text, all_of(case.reaches(n, ">=", level) for n in pair))
 
 
-def no_higher(case: Case, answer: Answer) -> Statements:
-    """Claim that two rules reach no higher level together than the reported one."""
-    high = Fraction(answer.measures[-1].value) + _ROUNDED
-    text = f"{_names(case, answer.rules)} reach no more than {float(high):g} together"
+def conflict(case: Case, answer: Answer) -> Statements:
+    """Claim that two rules reach no higher level together; check that they reach it."""
+    if isinstance(answer.state, Witness):
+        level, low = Fraction(case.settings.level), answer.measures[0].value
+        is_high = any(
+            claim.rules == answer.rules and fraction(claim.level) >= level
+            for claim in witness_claims(answer, "reaches")
+        )
+        require(is_high, "it is not claimed that both reach the level")
+        is_two = len({*map(case.then, answer.rules)}) == 2
+        require(is_two, "the rules are of one class")
+        require(answer.facts["level"] == low, "the level is another one")
+        every = _strengths(case, answer)
+        most = min(every[n - 1] for n in answer.rules)
+        off = Fraction(answer.facts.get("falls short", 0)) + ROUNDED
+        require(most >= Fraction(low) - off, "less is reached there")
+    high = Fraction(answer.measures[-1].value) + ROUNDED
+    text = f"{case.name(*answer.rules)} reach no more than {float(high):g} together"
     yield Statement(text, all_of(case.reaches(n, ">", high) for n in answer.rules))
 
 
 # --- where no rule fires
 
 
-def _no_gap(case: Case, beside: Iterable[str] = ()) -> Statement:
-    """Claim that some rule fires everywhere, but on surfaces."""
+def no_gap(case: Case, gaps: Iterable[Answer] = ()) -> Statement:
+    """Claim that some rule fires everywhere but in gaps, and on surfaces."""
     points = frozenset(
         name
         for name, side in case.sides.items()
         if side.low == side.high or case.model.variables[name].categories
     )
-    zeros = (case.script.zero(rule, case.rules, points) for rule in case.rules.rules)
-    text = "some rule fires everywhere" + (" but in the gaps listed" if beside else "")
-    return Statement(text, all_of([*zeros, *beside]))
+    formulas = [case.script.zero(rule, case.rules, points) for rule in case.rules.rules]
+    text = "some rule fires everywhere" + (" but in the gaps listed" if gaps else "")
+    for gap in gaps:
+        beyond = (f for span in gap.region for f in _beyond(case, span, math.inf))
+        formulas.append(any_of(beyond))
+    return Statement(text, all_of(formulas))
 
 
 def fires(case: Case, answer: Answer) -> Statements:
     """Claim that some rule fires everywhere."""
     require(case.model.is_whole, "rules that are left out may fire")
-    yield _no_gap(case)
+    yield no_gap(case)
 
 
 def covers(case: Case, answer: Answer) -> Statements:
@@ -307,10 +408,33 @@ def covers(case: Case, answer: Answer) -> Statements:
     if answer.message == "FT301.reaches":
         levels.add(Fraction(case.settings.epsilon))
     for level in levels - {ZERO}:
-        text = f"some rule reaches {float(level):g} everywhere"
         least = case.script.number(level)
         weak = (f"(< {case.symbol(n)} {least})" for n in case.numbers)
-        yield Statement(text, all_of(weak))
+        yield Statement(f"some rule reaches {float(level):g} everywhere", all_of(weak))
+
+
+def gap(case: Case, answer: Answer) -> Statements:
+    """Claim that every rule is as low in all of a region as at its witness."""
+    level, sign = ZERO, ">"
+    if answer.message == "FT301.weak":
+        level, sign = Fraction(case.settings.epsilon), ">="
+        yield from covers(case, answer)
+    is_low = any(
+        {*claim.rules} == {*case.numbers} and fraction(claim.level) <= level
+        for claim in witness_claims(answer, "below")
+    )
+    require(is_low, "it is not claimed that all rules are below")
+    wrong = any_of(case.reaches(n, sign, level) for n in case.numbers)
+    yield from _in_region(case, answer, wrong)
+
+
+def _in_region(case: Case, answer: Answer, wrong: str) -> Statements:
+    """Claim that something is wrong nowhere in the region of a witness."""
+    spans = answer.witness.region
+    outside = [f for span in spans for f in _beyond(case, span, -math.inf)]
+    if outside:
+        text = f"{answer.subject} is so in all of its region"
+        yield Statement(text, all_of([f"(not {any_of(outside)})", wrong]))
 
 
 def _beyond(case: Case, span: Span, way: float) -> Iterator[str]:
@@ -322,83 +446,55 @@ def _beyond(case: Case, span: Span, way: float) -> Iterator[str]:
             yield f"({sign} {own} {case.script.number(Fraction(moved))})"
 
 
-def within(case: Case, answer: Answer) -> Statements:
-    """Claim that what an answer says of its witness is so in all of its region."""
-    spans = answer.state.region if isinstance(answer.state, Witness) else ()
-    outside = [f for span in spans for f in _beyond(case, span, -math.inf)]
-    if answer.code == "FT205":
-        wrong = f"(not {path_to(case, answer.rules[0])})"
-    else:
-        is_weak = answer.message == "FT301.weak"
-        level = Fraction(case.settings.epsilon) if is_weak else ZERO
-        sign = ">=" if is_weak else ">"
-        wrong = any_of(case.reaches(n, sign, level) for n in case.numbers)
-        yield from covers(case, answer) if is_weak else ()
-    if outside:
-        text = f"{answer.subject} is so in all of its region"
-        yield Statement(text, all_of([f"(not {any_of(outside)})", wrong]))
-
-
-def no_more_gaps(case: Case, gaps: list[Answer]) -> Statement:
-    """Claim that no rule-free part of the domain lies outside of the listed gaps."""
-    every = (
-        any_of(f for span in gap.region for f in _beyond(case, span, math.inf))
-        for gap in gaps
-    )
-    return _no_gap(case, [*every])
-
-
 # --- terms, and what is counted
 
 
 def low_term(case: Case, answer: Answer) -> Statements:
     """Claim that a term is nowhere above the reported height, and below the level."""
-    (label,) = answer.terms
+    ((name, term),) = answer.terms
     height, level = answer.measure("height"), case.settings.level
     require((answer.message == "FT401.empty") is (not height), "it is not empty")
-    degree = case.script.degree(case.model.variables[label.variable], label.term)
-    most = case.script.number(Fraction(height) + (_ROUNDED if height else 0))
-    over = [f"(> {degree} {most})"]
-    over.append(f"(>= {degree} {case.script.number(Fraction(level))})")
-    text = (
-        f"{label.variable} is {label.term} is nowhere above {height:g}, nor {level:g}"
-    )
-    yield Statement(text, any_of(over))
+    degree = case.script.degree(case.model.variables[name], term)
+    most = case.script.number(Fraction(height) + (ROUNDED if height else 0))
+    least = case.script.number(Fraction(level))
+    text = f"{name} is {term} is nowhere above {height:g}, nor {level:g}"
+    yield Statement(text, any_of([f"(> {degree} {most})", f"(>= {degree} {least})"]))
 
 
 def heights(case: Case, answer: Answer) -> Statements:
     """Claim that all terms without a finding reach the level."""
-    level = Fraction(case.settings.level)
-    rest = [label for label in _rest(case, answer) if _is_evaluated(case, label)]
+    level, variables = Fraction(case.settings.level), case.model.variables
+    rest = [
+        (variables[name], term)
+        for name, term in _rest(case, answer)
+        if variables[name].curves[term].kind != "formula"
+    ]
     require(answer.facts["count"] == len(rest), "other terms reach it")
-    for name, term in rest:
-        variable = case.model.variables[name]
+    for variable, term in rest:
         curve, (low, high) = variable.curves[term], case.ends(variable)
         ends = [low, high, *(x for x in turns(curve) if low < x < high)]
         if all(bounds(curve, x, x)[0] < level for x in ends):
             degree = case.script.degree(variable, term)
             formula = f"(>= {degree} {case.script.number(level)})"
-            text = f"{name} is {term} reaches {float(level):g}"
+            text = f"{variable.name} is {term} reaches {float(level):g}"
             yield Statement(text, formula, "sat")
-
-
-def _is_evaluated(case: Case, label: tuple[str, str]) -> bool:
-    return case.model.variables[label[0]].curves[label[1]].kind != "formula"
 
 
 def _rest(case: Case, answer: Answer) -> list[tuple[str, str]]:
     """Return the terms without a finding of an answer's code."""
-    listed = {tuple(o.terms[0]) for o in case.coded(f"{answer.code}.") if o.terms}
+    answers = case.answers_of(f"{answer.code}.")
+    listed = {tuple(o.terms[0]) for o in answers if o.terms}
     return [label for label in case.model.labels if label not in listed]
 
 
-def counted(case: Case, answer: Answer) -> Statements:
+def counts(case: Case, answer: Answer) -> Statements:
     """Check that findings and the rest are everything; the rest is not decided."""
-    aside = {tuple(label) for o in case.coded("FTD.") for label in o.terms}
-    listed = len([o for o in case.coded(f"{answer.code}.") if o.terms or o.rules])
+    aside = {tuple(label) for o in case.answers_of("FTD.") for label in o.terms}
+    answers = case.answers_of(f"{answer.code}.")
+    listed = len([o for o in answers if o.terms or o.rules])
     if answer.code == "FT202":
-        _count(answer, "pairs", len(case.pairs(alike=False)))
-        _count(answer, "pairs listed", listed)
+        _check_count(answer, "pairs", len(case.pairs(alike=False)))
+        _check_count(answer, "pairs listed", listed)
         raise UndecidedError("ties on more than a surface")
     if answer.code == "FT402":
         count = len([label for label in _rest(case, answer) if label not in aside])
@@ -423,52 +519,67 @@ def unused(case: Case, answer: Answer) -> Statements:
     idle = [f"variable {name!r}" for name in model.variables if name not in names]
     rest = [pair for pair in model.labels if pair[0] in names and pair not in labels]
     idle += [f"term {term!r} of {name!r}" for name, term in rest]
-    listed = [o.subject for o in case.coded("FT404.unused")]
-    require(listed == idle, "other terms or variables are unused")
+    subjects = [o.subject for o in case.answers_of("FT404.unused")]
+    require(subjects == idle, "other terms or variables are unused")
     yield from ()
 
 
-def _count(answer: Answer, name: str, count: int) -> None:
+def _check_count(answer: Answer, name: str, count: int) -> None:
     """Refuse an answer whose measure is another count."""
     require(answer.measure(name) == count, f"{name}: {count} are counted here")
 
 
-Claims = Callable[[Case, Answer], Statements]
-_MESSAGES: dict[Claims, str] = {
-    never_wins: "FT101.never-wins FT101.may-decide-by-place",
-    never_fires: "FT101.never-fires FT107.silent",
-    silent: "FT101.weight-0 FT101.never-true",
-    live_leaves: "FT101.leaves",
-    dead_leaf: "FT101.leaf-excluded FT101.leaf-outside FT101.leaf-unmet",
-    hidden: "FT104.subsumed FT105.masked FT105.weaker",
-    no_other_hidden: "FT104.others FT105.others",
-    same: "FT106.same FT106.contradiction FT106.different",
-    no_others_same: "FT106.others",
-    superfluous: "FT103.superfluous",
-    irrelevant: "FT107.irrelevant",
-    apart: "FT201.never FT201.unlisted",
-    same_class: "FT204.alike",
-    fires: "FT301.fires",
-    covers: "FT301.reaches",
-    heights: "FT401.reached",
-    low_term: "FT401.low FT401.empty",
-    counted: "FT202.others FT402.sound FT403.others FT403.unlisted",
-    unused: "FT404.unused FT404.used",
-}
-CLAIMS = {name: claims for claims, names in _MESSAGES.items() for name in names.split()}
-"""The claims of each message that can be PROVED, or how reading decides it."""
+def not_decided(case: Case, answer: Answer) -> Statements:
+    """Leave an answer undecided."""
+    raise UndecidedError("no solver of lines and polynomials is asked for it")
+    yield
 
-BOUNDS: dict[str, Claims] = {
-    **dict.fromkeys(("FT102.marginal", "FT102.between"), no_lead),
-    **dict.fromkeys(("FT201.conflict", "FT201.may"), no_higher),
-    **dict.fromkeys(("FT301.gap", "FT301.gap-with-class"), within),
-    **dict.fromkeys(("FT205.region", "FT301.gap-of-system", "FT301.weak"), within),
-}
-"""What answers with a bracket or a witness claim of all of the domain."""
 
-PROVABLE = (
-    *CLAIMS,
-    *("FT107.more", "FT203.leaves", "FT402.outside", "FT402.peaks", "FT402.subnormal"),
-    *("FT403.equal", "FT403.within", "FT403.similar"),
+Check = Callable[[Case, Answer], Statements]
+
+
+def _table(messages: dict[Check, str]) -> dict[str, Check]:
+    return {name: check for check, names in messages.items() for name in names.split()}
+
+
+PROOFS = _table(
+    {
+        never_wins: "FT101.never-wins FT101.may-decide-by-place",
+        never_fires: "FT101.never-fires FT107.silent",
+        silent: "FT101.weight-0 FT101.never-true",
+        live_leaves: "FT101.leaves",
+        dead_leaf: "FT101.leaf-excluded FT101.leaf-outside FT101.leaf-unmet",
+        hidden: "FT104.subsumed FT105.masked FT105.weaker",
+        no_other_hidden: "FT104.others FT105.others",
+        same: "FT106.same FT106.contradiction FT106.different",
+        no_others_same: "FT106.others",
+        not_needed: "FT103.superfluous FT107.irrelevant",
+        apart: "FT201.never FT201.unlisted",
+        same_class: "FT204.alike",
+        fires: "FT301.fires",
+        covers: "FT301.reaches",
+        heights: "FT401.reached",
+        low_term: "FT401.low FT401.empty",
+        counts: "FT202.others FT402.sound FT403.others FT403.unlisted",
+        unused: "FT404.unused FT404.used",
+        not_decided: "FT107.more FT203.leaves FT402.outside FT402.peaks "
+        "FT402.subnormal FT403.equal FT403.within FT403.similar",
+    }
 )
-"""The messages of answers that must be PROVED, but for those that may be open."""
+"""How each message is checked that must be PROVED, but for those that may be open."""
+
+WITNESSES = _table(
+    {
+        wins: "FT101.wins FT101.fires FT102.leads",
+        ties: "FT101.decides-by-place FT202.tie",
+        needed: "FT103.needed FT107.needed",
+        conflict: "FT201.conflict",
+        raw_rules_differ: "FT203.differs",
+        leaf_region: "FT205.region",
+        gap: "FT301.weak FT301.gap FT301.gap-with-class FT301.gap-of-system",
+    }
+)
+"""How each message is checked that needs a witness."""
+
+BRACKETS = _table({no_lead: "FT102.marginal FT102.between", conflict: "FT201.may"})
+"""How the bounds of others are checked."""

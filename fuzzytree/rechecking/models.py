@@ -51,10 +51,17 @@ Way = tuple[Proposition, ...]
 
 
 class Rule(NamedTuple):
-    """A rule: what must hold, and the class or the text of what it concludes."""
+    """A rule: what must hold, and the class or the text of what it concludes.
+
+    `name` is what answers call it; `number` is its number in the file, from 1;
+    `outputs` is what a rule of a system concludes.
+    """
 
     when: Way
     then: str
+    name: str = ""
+    number: int = 0
+    outputs: tuple[Is, ...] = ()
 
 
 class Variable(NamedTuple):
@@ -100,8 +107,6 @@ class Model:
         rules: The rules; of a tree the relative ones, of a system its ways.
         raw: The raw rules of a tree.
         paths: The path to each leaf of a tree.
-        names: What answers call each rule.
-        numbers: The number in the file of each rule, from 1.
         silent: The names of rules of a system that never fire, as their text says.
         absent: The numbers in the file of rules that are not audited, by name.
         reasons: Why rules of a system are left out, by name.
@@ -175,15 +180,16 @@ class Model:
             self._read_tree(top)
         else:
             self.rules = self._rules(map(_rule, top["rules"]), self.variables)
-        self.numbers = [*range(1, len(self.rules.rules) + 1)]
-        self.names = [f"rule {number}" for number in self.numbers]
         self.labels_in_use = _labels(self.rules.rules)
         refuse_twice(top["classes"])
         if not {rule.then for rule in self.rules.rules} <= {*top["classes"]}:
             raise CannotRunError("a class that is not declared")
 
     def _rules(self, rules: Iterable[Rule], variables: Mapping[str, Variable]) -> Rules:
-        every = tuple(rules)
+        every = tuple(
+            rule._replace(name=f"rule {number}", number=number)
+            for number, rule in enumerate(rules, 1)
+        )
         labels = {(v.name, term) for v in variables.values() for term in v.curves}
         if not every or not _labels(every) <= labels:
             raise CannotRunError("rules of unknown terms, or none")
@@ -268,8 +274,6 @@ class Model:
                     norms.append(block.get("and", ""))
         self.is_product = norms.count("product") > norms.count("minimum")
         rules: list[Rule] = []
-        self.names, self.numbers = list[str](), list[int]()
-        self.thens: list[tuple[Is, ...]] = []
         for number, (name, block, rule, condition) in enumerate(owners, 1):
             weight = number_of(rule.get("weight", 1))
             then = read_conclusions(rule["then"])
@@ -288,10 +292,9 @@ class Model:
             if not ways:
                 self.absent[name] = number
             for place, way in enumerate(ways, 1):
-                rules.append(Rule(self._weighted(way, weight), text))
-                self.names.append(f"way {place} of {name}" if len(ways) > 1 else name)
-                self.numbers.append(number)
-                self.thens.append(then)
+                whole = f"way {place} of {name}" if len(ways) > 1 else name
+                when = self._weighted(way, weight)
+                rules.append(Rule(when, text, whole, number, then))
         curves = {name: {**v.curves} for name, v in self.variables.items()}
         for name, term in _labels(rules):
             plain, *hedges = term.split("\0")
@@ -389,13 +392,13 @@ class Model:
             return None
         return Proposition(name, tuple(terms), negated)
 
-    def may_conflict(self, a: int, b: int) -> bool:
-        """Return whether two rules of a system say different things of one output."""
-        if self.form != "system":
-            return True
-        thens = self.thens[a - 1], self.thens[b - 1]
-        shared = set.intersection(*({c.variable for c in then} for then in thens))
-        return any(c.variable in shared for c in {*thens[0]} ^ {*thens[1]})
+
+def may_conflict(a: Rule, b: Rule) -> bool:
+    """Return whether two rules say different things of one output."""
+    if not a.outputs:
+        return a.then != b.then
+    shared = {o.variable for o in a.outputs} & {o.variable for o in b.outputs}
+    return any(o.variable in shared for o in {*a.outputs} ^ {*b.outputs})
 
 
 def parts(condition: Condition | None) -> Iterator[Condition]:

@@ -9,7 +9,7 @@ from typing import Any
 
 
 class CannotRunError(ValueError):
-    """A file cannot be read: nothing is checked."""
+    """A file cannot be read, or a solver fails: nothing is checked."""
 
 
 class DoesNotHoldError(Exception):
@@ -21,11 +21,7 @@ class UndecidedError(Exception):
 
 
 def require(is_so: bool, otherwise: str) -> None:
-    """Refuse what the audit says, unless it is so.
-
-    Raises:
-        DoesNotHoldError: If it is not.
-    """
+    """Refuse what the audit says, unless it is so."""
     if not is_so:
         raise DoesNotHoldError(otherwise)
 
@@ -35,11 +31,11 @@ class Report:
 
     Attributes:
         unchecked: What is read and compared with nothing.
+        answers: The answers that are checked.
         wrong: What does not hold, a sentence each.
         refuted: By position why an answer does not hold.
-        counts: How often each kind of check was made.
+        counts: How many answers end in which way.
         undecided: The positions of the answers not decided again, by state and reason.
-        answers: The answers that are checked.
         confirmed: By position what confirms each answer: a solver, or `recheck`.
         unconfirmed: How many answers PROVED only a solver can confirm, without one.
     """
@@ -64,31 +60,31 @@ class Report:
             self.wrong.append(otherwise)
 
     @contextmanager
-    def answer(self, number: int, answer: Any) -> Generator[None]:
-        """Note what does not hold of an answer, or is undecided, with its place."""
-        where = f"answer {number} ({answer.code}, {answer.subject:.60})"
+    def answer(self, place: int) -> Generator[Any]:
+        """Yield an answer; note what does not hold of it, or is undecided."""
+        answer, why = self.answers[place], ""
         try:
-            yield
+            yield answer
         except CannotRunError:
             raise
         except DoesNotHoldError as error:
-            self._refute(number, where, str(error))
+            why = str(error)
         except UndecidedError as error:
             kind = type(answer.state).__name__.upper()
-            self.undecided[kind, str(error)].append(number - 1)
+            self.undecided[kind, str(error)].append(place)
         except (LookupError, ArithmeticError, ValueError, TypeError, AttributeError):
-            self._refute(number, where, "it names what there is not")
+            why = "it names what there is not"
+        if why:
+            where = f"answer {place + 1} ({answer.code}, {answer.subject:.60})"
+            self.wrong.append(f"{where}: {why}")
+            self.refuted.setdefault(place, why)
 
-    def _refute(self, number: int, where: str, why: str) -> None:
-        self.wrong.append(f"{where}: {why}")
-        self.refuted.setdefault(number - 1, why)
-
-    def confirm(self, number: int, by: str, *, is_bound: bool = False) -> None:
+    def confirm(self, place: int, by: str, *, is_bound: bool = False) -> None:
         """Note that a solver, or reading alone, confirms an answer or bounds of it."""
         kind = "bounds of other answers" if is_bound else "answers PROVED"
         way = "read and evaluated again" if by == "recheck" else f"confirmed by {by}"
         self.counts[f"{kind}, {way}"] += 1
-        self.confirmed[number - 1] = by
+        self.confirmed[place] = by
 
     def lines(self) -> Iterator[str]:
         """Yield the report, line by line."""
@@ -100,17 +96,16 @@ class Report:
             what += f"; {self.unconfirmed} answers PROVED are unconfirmed"
         yield what
         yield from (f"WRONG: {text}" for text in self.wrong)
-        counts = dict(sorted(self.counts.items()))
-        for (state, _), numbers in self.undecided.items():
-            name = f"answers {state}, not decided again"
-            counts[name] = counts.get(name, 0) + len(numbers)
+        counts = Counter(dict(sorted(self.counts.items())))
+        for (state, _), places in self.undecided.items():
+            counts[f"answers {state}, not decided again"] += len(places)
         width = max(map(len, counts), default=0)
         yield from (f"{name:<{width}}  {number}" for name, number in counts.items())
         if self.undecided:
             yield "not decided again:"
-        for (_, why), numbers in self.undecided.items():
-            size = f" ({len(numbers)} answers)" if len(numbers) > 1 else ""
-            codes = dict.fromkeys(self.answers[number].code for number in numbers)
+        for (_, why), places in self.undecided.items():
+            size = f" ({len(places)} answers)" if len(places) > 1 else ""
+            codes = dict.fromkeys(self.answers[place].code for place in places)
             yield f"  {', '.join(codes)}{size}: {why}"
         yield f"read, and compared with nothing: {self.unchecked}"
         if self.unconfirmed:

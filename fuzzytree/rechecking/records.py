@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import sys
 import types
@@ -31,9 +30,7 @@ class Coordinate(NamedTuple):
 
 
 class Claim(NamedTuple):
-    kind: Literal[
-        "strength", "beats", "ties", "below", "reaches", "decides", "degree", "covered"
-    ]
+    kind: Literal["strength", "beats", "ties", "below", "reaches", "decides"]
     of: Literal["rules", "tree", "raw rules", "old", "new"]
     rules: tuple[int, ...]
     rivals: tuple[int, ...]
@@ -134,6 +131,13 @@ class Answer(NamedTuple):
         values = [m.value for m in self.measures if m.name == name]
         require(len(values) == 1, f"no single measure {name!r}")
         return values[0]
+
+    @property
+    def witness(self) -> Witness:
+        """The state, which must be a witness."""
+        if not isinstance(self.state, Witness):
+            raise DoesNotHoldError("it needs a witness")
+        return self.state
 
 
 class DomainSide(NamedTuple):
@@ -262,20 +266,15 @@ def fraction(text: str | None) -> Fraction:
 
 
 _hints = lru_cache(get_type_hints)
+_LARGEST = sys.float_info.max
 
 
 def built(kind: Any, value: Any, where: str) -> Any:
-    """Return facts as a record: every field must be there, and no other.
-
-    Raises:
-        CannotRunError: If a fact has another type.
-    """
-    if kind == State and isinstance(value, dict):
-        tag = value.get("state")
-        if isinstance(tag, str) and tag in STATES:
-            rest = {key: item for key, item in value.items() if key != "state"}
-            return built(STATES[tag], rest, where)
+    """Return facts as a record: every field must be there, and no other."""
     origin, choices = get_origin(kind), get_args(kind)
+    if kind == State and isinstance(value, dict) and str(value.get("state")) in STATES:
+        rest = {key: item for key, item in value.items() if key != "state"}
+        return built(STATES[value["state"]], rest, where)
     if origin is types.UnionType and type(None) in choices:
         return None if value is None else built(choices[0], value, where)
     if origin is tuple and isinstance(value, list):
@@ -290,41 +289,34 @@ def built(kind: Any, value: Any, where: str) -> Any:
             raise CannotRunError(f"{where}: missing or unknown: {shown:.200}")
         of = _hints(kind)
         return kind(**{n: built(of[n], v, f"{where}, {n}") for n, v in value.items()})
-    number: Any = value if isinstance(value, int | float) else math.inf
-    is_real = not isinstance(value, bool) and abs(number) <= sys.float_info.max
-    if kind is float and is_real:
-        return float(number)
+    if kind is float and type(value) in (int, float) and abs(value) <= _LARGEST:
+        return float(value)
     if kind in (str, int, bool, dict[str, Any]) and type(value) is (origin or kind):
         return value
     raise CannotRunError(f"{where}: it cannot be {value!r:.60}")
 
 
 def read_json(content: bytes, name: str) -> dict[str, Any]:
-    """Return the facts of a file of JSON.
+    """Return the facts of a file of JSON, whose keys are unique and numbers finite."""
 
-    Raises:
-        CannotRunError: If it is no JSON object, or a key stands twice, or a number is
-            not finite.
-    """
+    def refuse(why: str) -> Any:
+        raise CannotRunError(f"{name}: {why}")
 
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        result = dict(pairs)
-        if len(result) < len(pairs):
-            raise CannotRunError(f"{name}: a key stands twice in one object")
-        return result
+    def once(pairs: list[tuple[str, Any]]) -> Any:
+        facts = dict(pairs)
+        is_once = len(facts) == len(pairs)
+        return facts if is_once else refuse("a key stands twice in one object")
 
-    def refuse(text: str) -> Any:
-        raise CannotRunError(f"{name}: {text} is no number that JSON knows")
+    def constant(text: str) -> Any:
+        return refuse(f"{text} is no number that JSON knows")
 
     if len(content) > MOST_BYTES:
-        raise CannotRunError(f"{name}: more than {MOST_BYTES:,} bytes")
+        refuse(f"more than {MOST_BYTES:,} bytes")
     try:
-        facts = json.loads(content, object_pairs_hook=once, parse_constant=refuse)
+        facts = json.loads(content, object_pairs_hook=once, parse_constant=constant)
         json.dumps(facts, ensure_ascii=False, allow_nan=False).encode()
     except CannotRunError:
         raise
     except (ValueError, RecursionError) as error:
         raise CannotRunError(f"{name}: not JSON: {error!s:.100}") from error
-    if not isinstance(facts, dict):
-        raise CannotRunError(f"{name}: an object is needed")
-    return facts
+    return facts if isinstance(facts, dict) else refuse("an object is needed")

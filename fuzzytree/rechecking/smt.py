@@ -158,9 +158,8 @@ class Script:
         self._lines.append(f"; {model.name}: {len(model.rules.rules)} rules")
         for variable in model.variables.values():
             self._add_variable(variable, of)
-        for number, rule in enumerate(model.rules.rules, 1):
-            name = model.names[number - 1]
-            self.add_rule(f"{of}{name}", rule, model.rules, of)
+        for rule in model.rules.rules:
+            self.add_rule(f"{of}{rule.name}", rule, model.rules, of)
 
     # --- words
 

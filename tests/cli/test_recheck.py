@@ -41,9 +41,6 @@ def test_an_audit_that_is_right_is_reported_with_what_was_checked(
         ["answers PROVED, read and evaluated again", "1"],
         ["answers with a WITNESS, evaluated again", "3"],
         ["bounds of other answers, confirmed by z3", "3"],
-        ["claims evaluated again", "3"],
-        ["facts about the audit", "12"],
-        ["sentences written again", "4"],
     ]
     assert nothing.startswith(
         "read, and compared with nothing: the version, the hash of "

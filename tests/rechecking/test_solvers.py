@@ -146,7 +146,8 @@ def test_the_text_has_the_exact_strengths_at_points(norm: Any, kind: Kind) -> No
             z3.Z3_eval_smtlib2_string(context.ref(), asked)
         assert z3.Z3_eval_smtlib2_string(context.ref(), "(check-sat)") == "sat\n"
         every = strengths(model.rules, point)
-        for name, (low, high) in zip(model.names, every, strict=True):
+        names = [rule.name for rule in model.rules.rules]
+        for name, (low, high) in zip(names, every, strict=True):
             assert low == high == value_of(z3, f"|{name}|", context)
 
 

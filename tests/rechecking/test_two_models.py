@@ -125,8 +125,9 @@ def test_a_comparison_without_a_field_is_refused() -> None:
     assert str(caught.value) == "diff.json: missing or unknown: verdict"
 
 
-def test_a_solver_that_fails_is_no_refutation() -> None:
-    found, old, new = compared(base(), base())
+@pytest.mark.parametrize("model", [base(), ft.read(TIPPER).model])
+def test_a_solver_that_fails_is_no_refutation(model: Document) -> None:
+    found, old, new = compared(model, model)
     names = "diff.json", "old.yaml", "new.yaml"
     with pytest.raises(CannotRunError, match=r"^no/such: no such program$"):
         recheck_difference(found.to_json().encode(), old, new, names, "no/such")
