@@ -20,6 +20,7 @@ from fuzzytree.rechecking.outcomes import CannotRunError, UndecidedError
 ZERO, ONE = Fraction(0), Fraction(1)
 Facts = dict[str, Any]
 Between = tuple[Fraction, Fraction]
+Numbers = tuple[Fraction, ...]
 CAP = 1 - Fraction(1, 2**53)  # the largest degree off a plateau
 _DIGITS = Context(prec=40)
 _PI = Fraction(31415926535897932384626433832795028841971693993751, 10**49)
@@ -133,7 +134,7 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
         raise UndecidedError("a curve (formula) is not evaluated here")
     degree = _CURVES[curve.kind][1]
     inner = (x for x in turns(curve) if low < x < high)
-    ends = [degree(x, *n) for x in (low, *inner, high)]
+    ends = [degree(x, n) for x in (low, *inner, high)]
     return min(end for end, _ in ends), max(end for _, end in ends)
 
 
@@ -146,12 +147,9 @@ def _side(
     spread, curve, reach = side
     u, v = (min(max(x / spread, ZERO), reach) for x in (low, high))
     a, b = min(u, ONE), min(v, ONE)
-    least = most = (
-        sum((c * a**k for k, c in enumerate(_body(curve))), start=ZERO)
-        if a == b
-        else ZERO
-    )
-    if a < b:  # in doubles, of the distance from the middle
+    if a == b:
+        least = most = sum((c * a**k for k, c in enumerate(_body(curve))), start=ZERO)
+    else:  # in doubles, of the distance from the middle
         poly = [*map(float, _body(curve))]
         off = sum(map(abs, poly)) * 2.0**-36  # more than all rounding
         middle, half = float(a + b) / 2, float(b - a) / 2 + 2.0**-50
@@ -160,7 +158,7 @@ def _side(
                 poly[place] += middle * poly[place + 1]
         off += sum(abs(c) * half**k for k, c in enumerate(poly) if k)
         least, most = Fraction(poly[0] - off), Fraction(poly[0] + off)
-    least, most = (min(max(y, ZERO), ONE) for y in (least, most))
+    least, most = _share(least), _share(most)
     if v <= 1:
         return least, most
     tails = [min((reach - x) / (reach - 1), ONE) ** 4 for x in (v, u)]
@@ -181,7 +179,7 @@ def _body(curve: tuple[float, ...]) -> tuple[Fraction, ...]:
 def _s(x: Fraction, start: Fraction, end: Fraction) -> Fraction:
     if start == end:
         return ONE if x > start else ZERO
-    t = min(max((x - start) / (end - start), ZERO), ONE)
+    t = _share((x - start) / (end - start))
     return 2 * t * t if 2 * t <= 1 else 1 - 2 * (1 - t) ** 2
 
 
@@ -229,19 +227,16 @@ def _power(x: Fraction, power: Fraction) -> Between:
 def _logistic(z: Fraction) -> Between:
     """Return between which numbers 1 / (1 + e**-z) lies."""
     low, high = _falling(abs(z))
-    return (
-        (low / (1 + low), high / (1 + high))
-        if z < 0
-        else (1 / (1 + high), 1 / (1 + low))
-    )
+    ends = low / (1 + low), high / (1 + high)
+    return ends if z < 0 else _complement(ends)
 
 
-def _cosine(x: Fraction, center: Fraction, width: Fraction) -> Between:
+def _cosine(x: Fraction, n: Numbers) -> Between:
     """Return between which numbers (1 + cos(2 pi (x - center) / width)) / 2 lies."""
-    turns = abs(x - center) / width
-    if 2 * turns >= 1:
+    phase = 2 * abs(x - n[0]) / n[1]
+    if phase >= 1:
         return ZERO, ZERO
-    square, low, high = (2 * turns * _PI) ** 2, -ONE, ONE
+    square, low, high = (phase * _PI) ** 2, -ONE, ONE
     for place in range(59, 0, -2):
         step = square / (place * (place + 1))
         ends = 1 - step * high, 1 - step * low
@@ -251,29 +246,22 @@ def _cosine(x: Fraction, center: Fraction, width: Fraction) -> Between:
     return (1 + max(low - off, -ONE)) / 2, (1 + min(high + off, ONE)) / 2
 
 
-def _bell(x: Fraction, center: Fraction, width: Fraction, slope: Fraction) -> Between:
+def _bell(x: Fraction, n: Numbers) -> Between:
+    center, width, slope = n
     if x == center:
-        return (ONE, ONE) if slope > 0 else (ZERO, ZERO)
+        return _exact(ONE if slope > 0 else ZERO)
     ends = [-2 * slope * end for end in _ln(abs(x - center) / width)]
     return _logistic(min(ends))[0], _logistic(max(ends))[1]
 
 
-def _gaussian(x: Fraction, mean: Fraction, deviation: Fraction) -> Between:
-    return _falling(((x - mean) / deviation) ** 2 / 2)
+def _gaussian(x: Fraction, n: Numbers) -> Between:
+    return _falling(((x - n[0]) / n[1]) ** 2 / 2)
 
 
-def _concave(x: Fraction, inflection: Fraction, end: Fraction) -> Between:
-    wide, sign = abs(end - inflection), 1 if end >= inflection else -1
-    far = wide + max((end - x) * sign, ZERO)
-    return (wide / far, wide / far) if far else (ONE, ONE)
-
-
-def _arc(x: Fraction, a: Fraction, b: Fraction) -> Between:
-    return _root(1 - (1 - _share((x - a) / (b - a))) ** 2)
-
-
-def _semi_ellipse(x: Fraction, a: Fraction, b: Fraction) -> Between:
-    return _root(1 - _share(abs(2 * x - a - b) / abs(b - a)) ** 2)
+def _concave(x: Fraction, n: Numbers) -> Between:
+    wide, sign = abs(n[1] - n[0]), 1 if n[1] >= n[0] else -1
+    far = wide + max((n[1] - x) * sign, ZERO)
+    return _exact(wide / far if far else ONE)
 
 
 def _exact(degree: Fraction) -> Between:
@@ -284,24 +272,24 @@ def _share(x: Fraction) -> Fraction:
     return min(max(x, ZERO), ONE)
 
 
-_CURVES: dict[str, tuple[str, Callable[..., Between]]] = {
+_CURVES: dict[str, tuple[str, Callable[[Fraction, Numbers], Between]]] = {
     "gaussian": ("mean, deviation", _gaussian),
-    "left half": (
-        "mean, deviation",
-        lambda x, mean, d: _gaussian(min(x, mean), mean, d),
-    ),
-    "right half": (
-        "mean, deviation",
-        lambda x, mean, d: _gaussian(max(x, mean), mean, d),
-    ),
+    "left half": ("mean, deviation", lambda x, n: _gaussian(min(x, n[0]), n)),
+    "right half": ("mean, deviation", lambda x, n: _gaussian(max(x, n[0]), n)),
     "bell": ("center, width, slope", _bell),
-    "sigmoid": ("inflection, slope", lambda x, at, slope: _logistic(slope * (x - at))),
-    "spike": ("center, width", lambda x, at, width: _falling(10 * abs(x - at) / width)),
-    "s": ("start, end", lambda x, start, end: _exact(_s(x, start, end))),
+    "sigmoid": ("inflection, slope", lambda x, n: _logistic(n[1] * (x - n[0]))),
+    "spike": ("center, width", lambda x, n: _falling(10 * abs(x - n[0]) / n[1])),
+    "s": ("start, end", lambda x, n: _exact(_s(x, *n))),
     "cosine": ("center, width", _cosine),
     "concave": ("inflection, end", _concave),
-    "arc": ("start, end", _arc),
-    "semi ellipse": ("start, end", _semi_ellipse),
+    "arc": (
+        "start, end",
+        lambda x, n: _root(1 - (1 - _share((x - n[0]) / (n[1] - n[0]))) ** 2),
+    ),
+    "semi ellipse": (
+        "start, end",
+        lambda x, n: _root(1 - _share(abs(2 * x - sum(n)) / abs(n[1] - n[0])) ** 2),
+    ),
 }
 """The names of a curve's numbers, and its degree at a point, enclosed."""
 

@@ -289,8 +289,9 @@ def built(kind: Any, value: Any, where: str) -> Any:
             raise CannotRunError(f"{where}: missing or unknown: {shown:.200}")
         of = _hints(kind)
         return kind(**{n: built(of[n], v, f"{where}, {n}") for n, v in value.items()})
-    if kind is float and type(value) in (int, float) and abs(value) <= _LARGEST:
-        return float(value)
+    number: Any = value
+    if kind is float and type(value) in (int, float) and abs(number) <= _LARGEST:
+        return float(number)
     if kind in (str, int, bool, dict[str, Any]) and type(value) is (origin or kind):
         return value
     raise CannotRunError(f"{where}: it cannot be {value!r:.60}")

@@ -20,8 +20,7 @@ _HEDGES = {hedge.replace(" ", "-"): hedge for hedge in HEDGES}
 _WORDS = {"", "is", "and", "or", "not", "(", ")", *_HEDGES}
 _TOKEN = re.compile(
     r"""\s*(?:('(?:[^']|'')*'|"(?:[^"]|"")*")  # a name in quotes
-    |(\([^\s()'"]+\)|[^\s()'"][^\s()]*(?:\([^\s()]*\))*)  # a word, (cm) or f(x) too
-    |([()]))""",
+    |(\([^\s()'"]+\)|[^\s()'"][^\s()]*(?:\([^\s()]*\))*|[()]))  # a word, (cm), f(x)""",
     re.VERBOSE,
 )
 
@@ -46,37 +45,26 @@ Condition = Is | Joint
 
 
 class _Words:
-    """The words of a sentence, and how many are read."""
+    """The words of a sentence that are not read, the next one last.
+
+    A name in quotes is without them, and begins with a blank.
+    """
 
     def __init__(self, text: str) -> None:
-        self.all: list[tuple[str, bool]] = []  # a name in quotes is marked
-        self.count = place = 0
-        text = text.rstrip()
+        self.rest, place, text = list[str](), 0, text.rstrip()
         while place < len(text):
             token = _TOKEN.match(text, place)
             if token is None:
                 raise ValueError("a quote that is not closed")
-            quoted, place = token[1], token.end()
-            name = quoted[1:-1].replace(quoted[0] * 2, quoted[0]) if quoted else ""
-            self.all.append((name, True) if quoted else (token[2] or token[3], False))
-        self.all.append(("", False))
-
-    @property
-    def next(self) -> tuple[str, bool]:
-        """The first word that is not read; at the end an empty one."""
-        return self.all[self.count]
-
-    @property
-    def is_over(self) -> bool:
-        return self.count == len(self.all) - 1
+            quoted, word = token.groups()
+            if quoted:
+                word = " " + quoted[1:-1].replace(quoted[0] * 2, quoted[0])
+            self.rest.insert(0, word)
+            place = token.end()
 
     def takes(self, *words: str) -> str:
         """Read a word if it is the next one, and return it."""
-        word, is_quoted = self.next
-        if is_quoted or word not in words:
-            return ""
-        self.count += 1
-        return word
+        return self.rest.pop() if self.rest and self.rest[-1] in words else ""
 
     def needs(self, *words: str) -> None:
         if not self.takes(*words):
@@ -84,28 +72,27 @@ class _Words:
 
     def name(self) -> str:
         """Read a name, in quotes or of several words; empty if there is none."""
-        start, (word, is_quoted) = self.count, self.next
-        if is_quoted:
-            self.count += 1
-            return word
-        while not self.next[1] and self.next[0] not in _WORDS:
-            self.count += 1
-        return " ".join(word for word, _ in self.all[start : self.count])
+        if self.rest and self.rest[-1].startswith(" "):
+            return self.rest.pop()[1:]
+        words: list[str] = []
+        while self.rest and self.rest[-1] not in _WORDS and self.rest[-1][0] != " ":
+            words.append(self.rest.pop())
+        return " ".join(words)
 
     def proposition(self) -> Is:
         """Read `variable is hedge ... term or term`; behind `any` it may be missing."""
-        variable, hedges = self.name(), list[str]()
+        variable, hedges, others = self.name(), list[str](), list[str]()
         self.needs("is")
         while hedge := self.takes(*_HEDGES):
             hedges.append(_HEDGES[hedge])
         term = self.name() or None
         if not variable or (term is None and hedges[-1:] != ["any"]):
             raise ValueError("a variable or a term is missing")
-        others, count = list[str](), self.count
+        rest = [*self.rest]
         while self.takes("or") and (other := self.name()) and not self.takes("is"):
             others.append(other)
-            count = self.count
-        self.count = count
+            rest = [*self.rest]
+        self.rest = rest
         return Is(variable, term, tuple(hedges), tuple(others))
 
     def joined(self, word: str, level: int) -> Condition:
@@ -114,29 +101,23 @@ class _Words:
             raise ValueError(f"more than {MOST_LEVELS} levels")
         parts: list[Condition] = []
         while not parts or self.takes(word):
-            parts.append(
-                self.joined("and", level) if word == "or" else self._part(level)
-            )
+            is_or = word == "or"
+            parts.append(self.joined("and", level) if is_or else self._part(level))
         return parts[0] if len(parts) == 1 else Joint(word, tuple(parts))
 
     def _part(self, level: int) -> Condition:
         """Read a proposition, or a condition in parentheses."""
-        if self.takes("not"):
-            if self.next != ("(", False):
-                raise ValueError("'(' is missing")
-            return Joint("not", (self.joined("part", level + 1),))
-        if not self.takes("("):
-            return self.proposition()
-        result = self.joined("or", level + 1)
-        self.needs(")")
-        return result
+        is_negated = bool(self.takes("not"))
+        if is_negated or self.rest[-1:] == ["("]:
+            self.needs("(")
+            result = self.joined("or", level + 1)
+            self.needs(")")
+            return Joint("not", (result,)) if is_negated else result
+        return self.proposition()
 
 
 def read_condition(sentences: Sequence[str]) -> Condition | None:
     """Return the condition of a rule's sentences; None if there are none.
-
-    Raises:
-        ValueError: If one is none.
 
     Example:
         >>> read_condition(["speed is not very high"])
@@ -146,22 +127,18 @@ def read_condition(sentences: Sequence[str]) -> Condition | None:
     for text in sentences:
         words = _Words(text)
         results.append(words.joined("or", 1))
-        if not words.is_over:
+        if words.rest:
             raise ValueError("more behind the condition")
-    return (
-        Joint("and", tuple(results)) if len(results) > 1 else next(iter(results), None)
-    )
+    if len(results) > 1:
+        return Joint("and", tuple(results))
+    return results[0] if results else None
 
 
 def read_conclusions(text: str) -> tuple[Is, ...]:
-    """Return what a sentence concludes.
-
-    Raises:
-        ValueError: If it is none.
-    """
+    """Return what a sentence concludes."""
     words, result = _Words(text), list[Is]()
     while not result or words.takes("and"):
         result.append(words.proposition())
-    if not words.is_over or any(one.term is None or one.others for one in result):
+    if words.rest or any(part.term is None or part.others for part in result):
         raise ValueError("no conclusions")
     return tuple(result)
