@@ -77,11 +77,7 @@ def turns(curve: Curve) -> list[Fraction]:
 
 
 def bounds(curve: Curve, low: Fraction, high: Fraction) -> Between:
-    """Return between which numbers the degrees of the values of an interval lie.
-
-    Raises:
-        UndecidedError: If the curve is not known here.
-    """
+    """Return between which numbers the degrees of the values of an interval lie."""
     if curve.kind == "lines":
         inner = [knot for knot in curve.numbers if low < knot.x < high]
         (_, first, *start), (*end, last, _) = (
@@ -323,11 +319,7 @@ def _hedged(hedge: str, degree: Between) -> Between:
 
 
 def keys(facts: Facts, needed: str, optional: str = "") -> None:
-    """Refuse facts that lack a key, or have another one.
-
-    Raises:
-        CannotRunError: If they do.
-    """
+    """Refuse facts that lack a key, or have another one."""
     must = {*needed.split(", ")}
     wrong = sorted(must - facts.keys() | facts.keys() - must - {*optional.split(", ")})
     if wrong:
@@ -335,24 +327,17 @@ def keys(facts: Facts, needed: str, optional: str = "") -> None:
 
 
 def number_of(value: Any) -> Fraction:
-    """Return a finite number, as the double that it is.
-
-    Raises:
-        CannotRunError: If it is none.
-    """
+    """Return a finite number, as the double that it is."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not math.isfinite(value):
         raise CannotRunError(f"no finite number: {value!r:.60}")
     return Fraction(float(value))
 
 
-def curve_of(facts: Facts) -> Curve:
-    """Return the membership function of a term.
-
-    Raises:
-        CannotRunError: If it is not known here.
-    """
-    height = number_of(facts.pop("height", 1))
+def curve_of(term: Facts) -> Curve:
+    """Return the membership function of a term."""
+    facts = {key: value for key, value in term.items() if key not in ("name", "height")}
+    height = number_of(term.get("height", 1))
     if facts == {"degree": 1}:
         curve = ANYTHING
     elif "mean" in facts and facts.keys() & {"spread", "left"}:

@@ -127,7 +127,7 @@ class Model:
                 f"{there}: fuzzytree convert {shlex.quote(name)} {there}"
             ) from error
         kind = top.get("kind") if isinstance(top, dict) else None
-        if str(kind) not in MEANINGS:
+        if str(kind) not in LAYOUTS:
             text = f"rule bases, trees and systems are checked, not {kind!r:.60}"
             raise CannotRunError(f"{name}: {text}")
         try:
@@ -139,11 +139,11 @@ class Model:
             raise CannotRunError(text) from None
 
     def _read(self, top: Facts, kind: str, left_out: set[str]) -> None:
+        needed, optional, always = LAYOUTS[kind]
         meaning = top.get("semantics", {})
-        is_ours = top.get("format") == "fuzzytree/1"
-        if not is_ours or not MEANINGS[kind].items() <= meaning.items():
+        if top.get("format") != "fuzzytree/1" or not always.items() <= meaning.items():
             raise CannotRunError("its meaning is not known")
-        keys(top, f"format, kind, name, semantics, {NEEDED[kind]}", OPTIONAL[kind])
+        keys(top, f"format, kind, name, semantics, {needed}", optional)
         self.name, self.facts = str(top["name"]), top
         self.raw: Rules | None = None
         self.paths: list[Steps] = []
@@ -154,24 +154,29 @@ class Model:
         for block in top.get("blocks", []):
             self.places += _places(block["rules"])
         self.term_places: dict[tuple[str, str], Place] = {}
-        for key in ("variables", "outputs", "sets"):
-            for entry in top.get(key, []):
-                terms = entry.get("terms", [])
-                name = entry.get("name", entry.get("variable"))
-                for term, place in zip(terms, _places(terms), strict=False):
-                    self.term_places.setdefault((name, term["name"]), place)
-        variables = [_variable(entry) for entry in top.get("variables", [])]
-        self.variables = {variable.name: variable for variable in variables}
-        refuse_twice([variable.name for variable in variables])
-        self.labels_in_use: set[tuple[str, str]] = set()
+        for entry in (
+            e for k in ("variables", "outputs", "sets") for e in top.get(k, [])
+        ):
+            terms, name = (
+                entry.get("terms", []),
+                entry.get("name", entry.get("variable")),
+            )
+            for term, place in zip(terms, _places(terms), strict=False):
+                self.term_places.setdefault((name, term["name"]), place)
+        self.variables = _by_name(map(_variable, top.get("variables", [])))
+        variables = self.variables.values()
         self.labels = [(v.name, term) for v in variables for term in v.curves]
         if kind == "system":
+            keys(meaning, ", ".join(always))
             self._read_system(top, left_out)
             return
+        keys(
+            meaning,
+            f"and, uncovered, missing, {', '.join(always)}",
+            "label type, sharpness, floor",
+        )
         self.missing = _class(meaning["missing"])
         self.uncovered = _class(meaning["uncovered"])
-        always = f"and, uncovered, missing, {', '.join(MEANINGS[kind])}"
-        keys(meaning, always, "label type, sharpness, floor")
         if meaning["and"] not in ("minimum", "product"):
             raise CannotRunError("its AND is not known")
         self.is_product = meaning["and"] == "product"
@@ -185,7 +190,7 @@ class Model:
         if not {rule.then for rule in self.rules.rules} <= {*top["classes"]}:
             raise CannotRunError("a class that is not declared")
 
-    def _rules(self, rules: Iterable[Rule], variables: Mapping[str, Variable]) -> Rules:
+    def _rules(self, rules: Iterable[Rule], variables: dict[str, Variable]) -> Rules:
         every = tuple(
             rule._replace(name=f"rule {number}", number=number)
             for number, rule in enumerate(rules, 1)
@@ -193,7 +198,7 @@ class Model:
         labels = {(v.name, term) for v in variables.values() for term in v.curves}
         if not every or not _labels(every) <= labels:
             raise CannotRunError("rules of unknown terms, or none")
-        return Rules({**variables}, every, self.is_product, self.uncovered)
+        return Rules(variables, every, self.is_product, self.uncovered)
 
     # --- trees
 
@@ -255,42 +260,38 @@ class Model:
 
     def _read_system(self, top: Facts, left_out: set[str]) -> None:
         self.form, self.missing, self.uncovered = "system", None, None
-        keys(top["semantics"], ", ".join(MEANINGS["system"]))
         refuse_twice([*self.variables, *(output["name"] for output in top["outputs"])])
         owners: list[tuple[str, Facts, Facts, Condition | None]] = []
-        norms: list[str] = []
         for place, block in enumerate(top["blocks"], 1):
             keys(block, "rules, activation", "and, or, implication, name")
             end = f" of block {place}" if len(top["blocks"]) > 1 else ""
             for index, rule in enumerate(block["rules"], 1):
                 keys(rule, "if, then", "weight, name")
-                condition = read_condition(rule["if"])
-                owners.append((f"rule {index}{end}", block, rule, condition))
-                every = [*parts(condition)]
-                self.labels_in_use |= {
-                    (p.variable, p.term or "") for p in every if isinstance(p, Is)
-                }
-                if any(isinstance(p, Joint) and p.word == "and" for p in every):
-                    norms.append(block.get("and", ""))
+                owner = f"rule {index}{end}", block, rule, read_condition(rule["if"])
+                owners.append(owner)
+        every = [(o[1].get("and", ""), part) for o in owners for part in parts(o[3])]
+        self.labels_in_use = {
+            (p.variable, p.term or "") for _, p in every if isinstance(p, Is)
+        }
+        norms = [norm for norm, p in every if isinstance(p, Joint) and p.word == "and"]
         self.is_product = norms.count("product") > norms.count("minimum")
         rules: list[Rule] = []
         for number, (name, block, rule, condition) in enumerate(owners, 1):
-            weight = number_of(rule.get("weight", 1))
+            weight, ways = number_of(rule.get("weight", 1)), list[Way]()
             then = read_conclusions(rule["then"])
             words = (
                 " ".join((c.variable, "is", *c.hedges, c.term or "")) for c in then
             )
-            text, ways = " and ".join(words), list[Way]()
+            text = " and ".join(words)
             try:
                 ways = self.ways(condition, block) if weight else []
             except UndecidedError as error:
                 self.reasons[name] = str(error)
-            if name in left_out or name in self.reasons:
-                ways = []
-            elif not ways:
-                self.silent.append(name)
-            if not ways:
+            is_left_out = name in left_out or name in self.reasons
+            if is_left_out or not ways:
                 self.absent[name] = number
+                self.silent += [] if is_left_out else [name]
+                continue
             for place, way in enumerate(ways, 1):
                 whole = f"way {place} of {name}" if len(ways) > 1 else name
                 when = self._weighted(way, weight)
@@ -322,11 +323,7 @@ class Model:
     def ways(
         self, condition: Condition | None, block: Facts, *, negated: bool = False
     ) -> list[Way]:
-        """Return the ways in which a condition holds, or does not; none if never.
-
-        Raises:
-            UndecidedError: If it does not hold by its ways.
-        """
+        """Return the ways in which a condition holds, or does not; none if never."""
         if condition is None:
             return [()]
         if isinstance(condition, Is):
@@ -415,43 +412,47 @@ def _labels(rules: Iterable[Rule]) -> set[tuple[str, str]]:
 
 # --- the layout of a file
 
-MEANINGS: dict[str, dict[str, str]] = {
-    "rule base": {
-        "or": "maximum",
-        "not": "1 - degree",
-        "answer": "the class of the first of the strongest rules",
-    },
-    "tree": {
-        "cuts": "a value equal to a cut lies below it",
-        "answer": "the class of the leaf that the nodes lead to",
-    },
-    "system": {
-        "not": "1 - degree",
-        "activated": "rules whose weighted degree is above 0",
-        "missing": "a value that is missing or infinite makes every output nan",
-    },
+LAYOUTS: dict[str, tuple[str, str, dict[str, str]]] = {
+    "rule base": (
+        "classes, rules",
+        "variables, columns, terms",
+        {
+            "or": "maximum",
+            "not": "1 - degree",
+            "answer": "the class of the first of the strongest rules",
+        },
+    ),
+    "tree": (
+        "classes, leaves",
+        "variables, columns, nodes, sets",
+        {
+            "cuts": "a value equal to a cut lies below it",
+            "answer": "the class of the leaf that the nodes lead to",
+        },
+    ),
+    "system": (
+        "outputs, blocks",
+        "variables, note",
+        {
+            "not": "1 - degree",
+            "activated": "rules whose weighted degree is above 0",
+            "missing": "a value that is missing or infinite makes every output nan",
+        },
+    ),
 }
-"""What models of each kind always mean."""
-NEEDED = {
-    "rule base": "classes, rules",
-    "tree": "classes, leaves",
-    "system": "outputs, blocks",
-}
-OPTIONAL = {
-    "rule base": "variables, columns, terms",
-    "tree": "variables, columns, nodes, sets",
-    "system": "variables, note",
-}
+"""The keys of each kind of model, those that it may have, and what it always means."""
 
 
 def refuse_twice(names: Sequence[str]) -> None:
-    """Refuse a name that stands twice.
-
-    Raises:
-        CannotRunError: If one does.
-    """
+    """Refuse a name that stands twice."""
     if len({*names}) < len(names):
         raise CannotRunError("a name stands twice")
+
+
+def _by_name(variables: Iterable[Variable]) -> dict[str, Variable]:
+    every = [*variables]
+    refuse_twice([variable.name for variable in every])
+    return {variable.name: variable for variable in every}
 
 
 def _class(text: str) -> str | None:
@@ -473,22 +474,19 @@ def _variable(facts: Facts) -> Variable:
     ends = facts.get("range", {})
     if ends.keys() - {"from", "to", "outside"}:
         raise CannotRunError("a range with other ends")
-    numbers = {k: float(number_of(ends[k])) for k in ("from", "to") if k in ends}
-    inputs = [
-        (
-            part["input"],
-            number_of(part["weight"]),
-            number_of(part.get("centre", 0)),
-        )
-        for part in facts.get("sum of", [])
-    ]
+    low, high = (
+        float(number_of(ends[k])) if k in ends else None for k in ("from", "to")
+    )
     return Variable(
         facts["name"],
         _curves(facts.get("terms", [])),
         facts.get("unit", ""),
-        numbers.get("from"),
-        numbers.get("to"),
-        tuple(inputs),
+        low,
+        high,
+        tuple(
+            (part["input"], number_of(part["weight"]), number_of(part.get("centre", 0)))
+            for part in facts.get("sum of", [])
+        ),
         "outside" in ends,
         tuple(facts.get("categories", ())),
         number_of(facts["missing as"]) if "missing as" in facts else None,
@@ -496,11 +494,11 @@ def _variable(facts: Facts) -> Variable:
     )
 
 
-def _curves(terms: Iterable[Facts]) -> dict[str, Curve]:
-    terms = [{**term} for term in terms]
-    names = [term.pop("name") for term in terms]
-    refuse_twice(names)
-    return dict(zip(names, map(curve_of, terms), strict=True))
+def _curves(terms: Sequence[Facts]) -> dict[str, Curve]:
+    curves = {term["name"]: curve_of(term) for term in terms}
+    if len(curves) < len(terms):
+        raise CannotRunError("a name stands twice")
+    return curves
 
 
 def _rule(facts: Facts) -> Rule:

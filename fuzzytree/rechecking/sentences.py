@@ -44,10 +44,6 @@ def sentence_of(answer: Any) -> str:
     The answer is an audit's own record, or what the re-checker read of it: these share
     no class, but the names of fields. What the subject, the state, the region or a
     measure holds is no fact besides.
-
-    Raises:
-        KeyError: As `rendered`.
-        ValueError: As `rendered`, and if the message does not say one of the facts.
     """
     unsaid = answer.facts.keys() - names_in(answer.message)
     if unsaid:
@@ -65,20 +61,12 @@ def sentence_of(answer: Any) -> str:
 
 
 def names_in(message: str) -> set[str]:
-    """Return the names of the facts that a message says.
-
-    Raises:
-        KeyError: If there is no such message.
-    """
+    """Return the names of the facts that a message says."""
     return {field[1] for field in _FIELD.finditer(MESSAGES[message].text)}
 
 
 def rendered(message: str, facts: Mapping[str, Fact]) -> str:
     """Return the sentence of a message.
-
-    Raises:
-        KeyError: If there is no such message, or a fact is missing.
-        ValueError: If a fact is not of the kind that the template shows.
 
     Example:
         >>> rendered("FT404.used", {"variables in use": 1, "terms in use": 3})
@@ -101,9 +89,6 @@ def shown(fact: Fact, how: str) -> str:
     a format of Python. `q` is a name in quotes, or `no class`. Of rows of names and
     numbers, `within` is a region, `above` the half-open box of a leaf, and `at` a
     point. `?` is nothing.
-
-    Raises:
-        ValueError: If the fact is not of this kind.
 
     Example:
         >>> shown(2, "n term has|terms have"), shown(0.25, "p"), shown(None, "q")

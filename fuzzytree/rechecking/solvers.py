@@ -58,9 +58,6 @@ def ask(text: str, statements: Sequence[Statement], program: str = "") -> Result
 
     Returns:
         The answers; of a solver without a name if there is none.
-
-    Raises:
-        CannotRunError: If the program is missing, dies, or answers something else.
     """
     if program:
         return _ask_program(text, statements, program)

@@ -48,9 +48,6 @@ class _Line(NamedTuple):
 def read_yaml(content: bytes, name: str) -> Any:
     r"""Return what a file of YAML holds: mappings, lists, texts and numbers.
 
-    Raises:
-        CannotRunError: If it is not in the subset that fuzzytree writes.
-
     Example:
         >>> read_yaml(b"classes: [a, 'b']\nrange: {from: 1.5}\n", "x.yaml")
         {'classes': ['a', 'b'], 'range': {'from': 1.5}}
