@@ -72,12 +72,12 @@ def rendered(message: str, facts: Mapping[str, Fact]) -> str:
         >>> rendered("FT404.used", {"variables in use": 1, "terms in use": 3})
         'rules use 1 variable and 3 terms'
     """
-    template = _PART.sub(
-        lambda part: (
-            part[1] if all(f[1] in facts for f in _FIELD.finditer(part[1])) else ""
-        ),
-        MESSAGES[message].text,
-    )
+
+    def part(match: re.Match[str]) -> str:
+        is_whole = all(field[1] in facts for field in _FIELD.finditer(match[1]))
+        return match[1] if is_whole else ""
+
+    template = _PART.sub(part, MESSAGES[message].text)
     return _FIELD.sub(lambda field: shown(facts[field[1]], field[2] or ""), template)
 
 
@@ -94,19 +94,29 @@ def shown(fact: Fact, how: str) -> str:
         >>> shown(2, "n term has|terms have"), shown(0.25, "p"), shown(None, "q")
         ('2 terms have', '25 %', 'no class')
     """
-    if how == "?":
-        return ""
-    if fact is None and how == "q":
-        return "no class"
-    if isinstance(fact, str) and how in ("", "q", "s"):
-        return repr(fact) if how == "q" else fact
-    if isinstance(fact, str) or fact is None or how == "q":
-        raise ValueError(f"{fact!r} is not shown as {how!r}")
-    if isinstance(fact, int | float):
-        return _number(fact, how)
-    if how not in _ROWS:
-        raise ValueError(f"rows are not shown as {how!r}")
-    return _ROWS[how](fact)
+    match fact, how:
+        case _, "?":
+            return ""
+        case None, "q":
+            return "no class"
+        case str(), "q":
+            return repr(fact)
+        case str(), "" | "s":
+            return fact
+        case ((int() | float()), _) if how != "q":
+            return _number(fact, how)
+        case ((list() | tuple()), "within"):
+            texts = [_side(name, _closed, of) for name, *of in fact[:_MOST_SIDES]]
+            texts += ["so on"] * (len(fact) > _MOST_SIDES)
+            return _where(texts, "here")
+        case ((list() | tuple()), "above"):
+            sides = [row for row in fact if [*row[1:]] != [None, None]]
+            texts = [_side(name, open_interval, of) for name, *of in sides]
+            return _where(texts, "everywhere")
+        case ((list() | tuple()), "at"):
+            return " and ".join(f"{name!r} is {value}" for name, value in fact)
+        case _:
+            raise ValueError(f"{fact!r} is not shown as {how!r}")
 
 
 def _number(fact: float, how: str) -> str:
@@ -123,41 +133,24 @@ def _number(fact: float, how: str) -> str:
     return format(fact, how) if how else str(fact)
 
 
-Rows = Sequence[Sequence[Scalar]]
+def _where(texts: Sequence[str], nowhere: str) -> str:
+    return f"where {' and '.join(texts)}" if texts else nowhere
 
 
-def _within(region: Rows) -> str:
-    texts = [
-        f"{name!r} is {_side(_stretch, *of)}" for name, *of in region[:_MOST_SIDES]
-    ]
-    texts += ["so on"] * (len(region) > _MOST_SIDES)
-    return f"where {' and '.join(texts)}" if texts else "here"
+def _side(
+    name: Scalar, show: Callable[[Scalar, Scalar], str], of: Sequence[Scalar]
+) -> str:
+    """Return that a variable is in an interval, or is what a word says."""
+    return f"{name!r} is {show(*of) if len(of) == 2 else of[0]}"
 
 
-def _side(show: Callable[[Scalar, Scalar], str], *of: Scalar) -> str:
-    """Return an interval, or a word for it."""
-    if len(of) == 2:
-        return show(*of)
-    (word,) = of
-    return str(word)
-
-
-def _stretch(low: Scalar, high: Scalar) -> str:
+def _closed(low: Scalar, high: Scalar) -> str:
     """Return an interval; one without a lower or an upper end as such."""
     if low is None or high is None:
         return f"at most {_six(high)}" if low is None else f"at least {_six(low)}"
     if _six(low) == _six(high):
         return f"about {_six(low)}" if low != high else _six(low)
     return f"{_six(low)} to {_six(high)}"
-
-
-def _above(box: Rows) -> str:
-    texts = [
-        f"{name!r} is {_side(open_interval, *of)}"
-        for name, *of in box
-        if of != [None, None]
-    ]
-    return f"where {' and '.join(texts)}" if texts else "everywhere"
 
 
 def open_interval(low: Scalar, high: Scalar) -> str:
@@ -176,10 +169,3 @@ def _six(number: Scalar) -> str:
     if not isinstance(number, int | float):
         raise ValueError(f"{number!r} is no number")
     return f"{number:.6g}"
-
-
-def _at(point: Rows) -> str:
-    return " and ".join(f"{name!r} is {value}" for name, value in point)
-
-
-_ROWS = {"within": _within, "above": _above, "at": _at}

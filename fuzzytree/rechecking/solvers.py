@@ -75,24 +75,23 @@ def ask(text: str, statements: Sequence[Statement], program: str = "") -> Result
             raise CannotRunError(f"{name}: it fails: {error!s:.200}") from error
         return result.strip()
 
+    def steps_so_far() -> int:
+        match = re.search(r"\d+", run("(get-info :rlimit)"))
+        return int(match[0]) if match else 0
+
     run(text)
     for claim in statements:
         steps = min(left, STEPS_OF_A_CLAIM)
         if steps <= 0:
             answers.append("unknown")
             continue
-        before = _steps(run("(get-info :rlimit)"))
+        before = steps_so_far()
         reply = run(f"(set-option :rlimit {steps})\n{_block(claim)}")
-        left -= _steps(run("(get-info :rlimit)")) - before
+        left -= steps_so_far() - before
         if not _ANSWER.fullmatch(reply):
             raise CannotRunError(f"{name}: it answers {reply!r:.100}")
         answers.append(reply)
     return Results(name, answers)
-
-
-def _steps(reply: str) -> int:
-    match = re.search(r"\d+", reply)
-    return int(match[0]) if match else 0
 
 
 def _ask_program(text: str, statements: Sequence[Statement], program: str) -> Results:
@@ -115,11 +114,10 @@ def _ask_program(text: str, statements: Sequence[Statement], program: str) -> Re
     except OSError as error:
         raise CannotRunError(f"{path}: {error.strerror or error}") from error
     answers = ran.stdout.split()
-    wrong = [a for a in answers if not _ANSWER.fullmatch(a)]
-    if wrong or (ran.returncode and len(answers) < len(statements)):
-        reply = (
-            ran.stdout if wrong else ran.stderr
-        ).strip() or f"exit {ran.returncode}"
+    is_wrong = not all(map(_ANSWER.fullmatch, answers))
+    if is_wrong or (ran.returncode and len(answers) < len(statements)):
+        reply = (ran.stdout if is_wrong else ran.stderr).strip()
+        reply = reply or f"exit {ran.returncode}"
         raise CannotRunError(f"{path}: it fails: {reply!r:.200}")
     if len(answers) != len(statements):
         counts = f"{len(answers)} answers to {len(statements)} claims"
