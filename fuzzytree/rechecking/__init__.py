@@ -188,7 +188,7 @@ def model_text(model: bytes) -> str:
         for v in whole.variables.values()
         if v.low is not None and v.high is not None
     }
-    script.add(whole, ends)
+    script.add(whole, ends, {})
     return script.text()
 
 

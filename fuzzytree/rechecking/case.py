@@ -79,12 +79,11 @@ class Case:
         self.add_to(script)
         return script
 
-    def add_to(self, script: Script, of: str = "", *, is_bounded: bool = True) -> None:
+    def add_to(self, script: Script, *, is_bounded: bool = True) -> None:
         """Add the model to a text, within the domain or for all numbers."""
         sides = self.sides if is_bounded else {}
         ends = {n: (Fraction(s.low), Fraction(s.high)) for n, s in sides.items()}
-        values = {name: side.points for name, side in sides.items()}
-        script.add(self.model, ends, of, values)
+        script.add(self.model, ends, {n: side.points for n, side in sides.items()})
 
     def reaches(self, number: int, sign: str, level: Fraction) -> str:
         """Return that a rule's strength is `>` or `>=` a level."""

@@ -168,8 +168,8 @@ def not_needed(case: Case, answer: Answer) -> Statements:
     others, name = [*own], f"a model without {case.name(number)}"
     if answer.code == "FT107":  # its rest takes no input from another class
         name = f"{case.name(number)} without {answer.facts['proposition']}"
-        rest = case.script.add_rule(name, without(case, answer), case.rules)
-        own[number - 1] = rest
+        rest = without(case, answer)._replace(name=name)
+        own[number - 1] = case.script.add_rule(rest, case.rules)
     else:
         others[number - 1] = "0.0"
     for is_strict in (True, False):

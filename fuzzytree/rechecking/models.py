@@ -77,6 +77,7 @@ class Variable(NamedTuple):
     categories: tuple[str, ...] = ()
     missing: Fraction | None = None
     is_whole: bool = False
+    of: str = ""  # before its name in a text of two models
 
     def at(self, point: Point) -> Fraction:
         """Return its value at a point."""
@@ -303,6 +304,15 @@ class Model:
             curves[name][term] = curve._replace(hedges=tuple(hedges))
         variables = {n: v._replace(curves=curves[n]) for n, v in self.variables.items()}
         self.rules = Rules(variables, tuple(rules), self.is_product, None)
+
+    def put_before_names(self, of: str) -> None:
+        """Distinguish the rules and variables from those of another model."""
+        self.variables = {n: v._replace(of=of) for n, v in self.variables.items()}
+        rules, curves = self.rules.rules, self.rules.variables.items()
+        self.rules = self.rules._replace(
+            rules=tuple(rule._replace(name=of + rule.name) for rule in rules),
+            variables={name: v._replace(of=of) for name, v in curves},
+        )
 
     @property
     def is_whole(self) -> bool:

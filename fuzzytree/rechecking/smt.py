@@ -18,7 +18,6 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from types import MappingProxyType
 
 from fuzzytree.rechecking.curves import (
     ONE,
@@ -140,26 +139,24 @@ class Script:
         self,
         model: Model,
         ends: Mapping[str, Ends],
-        of: str = "",
-        values: Mapping[str, Sequence[Fraction]] = MappingProxyType({}),
+        values: Mapping[str, Sequence[Fraction]],
     ) -> None:
         """Add the inputs, terms and rules of a model.
 
         Args:
             model: The model.
             ends: The values of each variable of which they are known.
-            of: What stands before its names, such as `old `.
             values: Further values of inputs, or the only ones of categories; those
                 that the model declares unless given.
         """
         self._values |= values
-        self.is_product |= model.rules.is_product
         self._ends |= ends
+        self.is_product |= model.rules.is_product
         self._lines.append(f"; {model.name}: {len(model.rules.rules)} rules")
         for variable in model.variables.values():
-            self._add_variable(variable, of)
+            self._add_variable(variable)
         for rule in model.rules.rules:
-            self.add_rule(f"{of}{rule.name}", rule, model.rules, of)
+            self.add_rule(rule, model.rules)
 
     # --- words
 
@@ -189,10 +186,10 @@ class Script:
 
     # --- variables
 
-    def _add_variable(self, variable: Variable, of: str) -> None:
+    def _add_variable(self, variable: Variable) -> None:
         if not variable.parts and ("input", variable.name) in self._symbols:
             return  # of two models
-        own = self.value(variable, of)
+        own = self.value(variable)
         if variable.parts:
             parts = (
                 f"(* {self.number(w)} (- {self.symbol(n, 'input')} {self.number(c)}))"
@@ -204,11 +201,10 @@ class Script:
             self._lines.append(f"(declare-const {own} Real){unit}")
         self._assert_values(variable, own)
 
-    def value(self, variable: Variable, of: str = "") -> str:
-        """Return the symbol of a variable's value."""
-        return self.symbol(
-            f"{of}{variable.name}" if variable.parts else variable.name, "input"
-        )
+    def value(self, variable: Variable) -> str:
+        """Return the symbol of a variable's value; two models have the same inputs."""
+        of = variable.of if variable.parts else ""
+        return self.symbol(of + variable.name, "input")
 
     def _assert_values(self, variable: Variable, own: str) -> None:
         """Assert the values that an input can have."""
@@ -234,12 +230,12 @@ class Script:
 
     # --- degrees
 
-    def degree(self, variable: Variable, term: str, of: str = "") -> str:
+    def degree(self, variable: Variable, term: str) -> str:
         """Return the degree of a term; its function is added at its first use."""
-        key = of, variable.name, term
+        key = variable.of, variable.name, term
         if key not in self._terms:
-            curve, own = variable.curves[term], self.value(variable, of)
-            name = f"{of}{variable.name} is {_words(term)}"
+            curve, own = variable.curves[term], self.value(variable)
+            name = f"{variable.of}{variable.name} is {_words(term)}"
             if is_straight(curve):
                 self._define(name, lines_of(curve, ZERO, ONE)[0])
                 self._terms[key] = f"({self.symbol(name)} {own})"
@@ -264,13 +260,10 @@ class Script:
             for side, function in zip(sides, lines_of(curve, *ends), strict=True):
                 self._define(name + side, function)
             low, high = (f"({self.symbol(name + side)} {own})" for side in sides)
-            self._lines.append(
-                f"(assert (and (<= {low} {degree}) (<= {degree} {high})))"
-            )
-        sign = "<" if is_positive else "<="
-        self._lines.append(
-            f"(assert (and ({sign} 0.0 {degree}) (<= {degree} {height})))"
-        )
+            within = f"(<= {low} {degree}) (<= {degree} {high})"
+            self._lines.append(f"(assert (and {within}))")
+        within = f"({'<' if is_positive else '<='} 0.0 {degree}) (<= {degree} {height})"
+        self._lines.append(f"(assert (and {within}))")
         return degree
 
     def _region(self, variable: Variable, curve: Curve) -> Ends:
@@ -321,22 +314,22 @@ class Script:
         most = self.number(level)
         if rules.is_product:
             return f"({sign} {self.strength(rule, rules)} {most})"
-        degrees = self._degrees(rule, rules, "")
+        degrees = self._degrees(rule, rules)
         return all_of(f"({sign} {degree} {most})" for degree in degrees)
 
-    def strength(self, rule: Rule, rules: Rules, of: str = "") -> str:
+    def strength(self, rule: Rule, rules: Rules) -> str:
         """Return how far a rule applies."""
-        text, *rest = self._degrees(rule, rules, of)
+        text, *rest = self._degrees(rule, rules)
         for degree in rest:
             text = f"({'*' if rules.is_product else 'min'} {text} {degree})"
         return text
 
-    def _degrees(self, rule: Rule, rules: Rules, of: str) -> list[str]:
+    def _degrees(self, rule: Rule, rules: Rules) -> list[str]:
         """Return how far each proposition of a rule applies."""
         result: list[str] = []
         for name, terms, is_negated, weight in rule.when:
             variable = rules.variables[name]
-            text, *rest = (self.degree(variable, term, of) for term in terms)
+            text, *rest = (self.degree(variable, term) for term in terms)
             for degree in rest:
                 text = f"(max {text} {degree})"
             text = f"(- 1.0 {text})" if is_negated else text
@@ -350,75 +343,64 @@ class Script:
         own = {n: tuple(p for p in rule.when if p.variable == n) for n in names}
         return {n: self.strength(Rule(own[n], ""), rules) for n in names}
 
-    def add_rule(self, name: str, rule: Rule, rules: Rules, of: str = "") -> str:
+    def add_rule(self, rule: Rule, rules: Rules) -> str:
         """Add a function that is the strength of a rule, once, and return it."""
-        if ("rule", name) in self._symbols:
-            return self.symbol(name)
-        own, text = self.symbol(name), self.strength(rule, rules, of)
+        if ("rule", rule.name) in self._symbols:
+            return self.symbol(rule.name)
+        own, text = self.symbol(rule.name), self.strength(rule, rules)
         when = " and ".join(map(str, rule.when)).replace("\0", " ") or "anything"
-        self._lines += [
-            f"(define-fun {own} () Real ; {_plain(f'if {when} then {rule.then}')}",
-            f"  {text})",
-        ]
+        comment = _plain(f"if {when} then {rule.then}")
+        self._lines.append(f"(define-fun {own} () Real ; {comment}\n  {text})")
         return own
 
     # --- where rules are 0
 
-    def zero(
-        self, rule: Rule, rules: Rules, points: frozenset[str], of: str = ""
-    ) -> str:
+    def zero(self, rule: Rule, rules: Rules, points: frozenset[str]) -> str:
         """Return where a rule is 0 at a point and around it.
 
         `points`: the variables whose values have none beside them.
         """
         return any_of(
-            self._zero(p, rules.variables[p.variable], p.variable in points, of)
+            self._zero(p, rules.variables[p.variable], p.variable in points)
             for p in rule.when
         )
 
     def _zero(
-        self, proposition: Proposition, variable: Variable, is_point: bool, of: str
+        self, proposition: Proposition, variable: Variable, is_point: bool
     ) -> str:
         if not proposition.weight:
             return "true"
-        level, formulas = ONE if proposition.negated else ZERO, []
+        level, formulas = ONE if proposition.negated else ZERO, list[str]()
         for term in proposition.terms:
-            degree, curve = self.degree(variable, term, of), variable.curves[term]
+            curve = variable.curves[term]
             if is_point or not is_straight(curve):
+                degree = self.degree(variable, term)
                 formulas.append(f"(= {degree} {self.number(level)})")
-                continue
-            name = f"{of}{variable.name} is {_words(term)}: {level} around"
-            if ("zero", name) not in self._symbols:
-                flat = any_of(self._flat(curve.numbers, level))
-                head = f"(define-fun {self.symbol(name, 'zero')} ((x Real)) Bool"
-                self._lines.append(f"{head} {flat})")
-            around = self.symbol(name, "zero")
-            formulas.append(f"({around} {self.value(variable, of)})")
+            else:
+                own = self.value(variable)
+                formulas.append(any_of(self._flat(curve.numbers, level, own)))
         return any_of(formulas) if proposition.negated else all_of(formulas)
 
-    def _flat(self, knots: Knots, level: Fraction) -> Iterator[str]:
-        """Yield the open intervals on which a function is at a level."""
+    def _flat(self, knots: Knots, level: Fraction, own: str) -> Iterator[str]:
+        """Yield that a value is in an open interval where a function is at a level."""
         starts = [knots[0].before, *(knot.after for knot in knots)]
         ends = [*(knot.before for knot in knots), knots[-1].after]
         is_flat = [a == b == level for a, b in zip(starts, ends, strict=True)]
         above: list[str] = []
         for knot, is_before, is_after in zip(knots, is_flat, is_flat[1:], strict=False):
-            is_on = is_before and knot.at == level
-            x = self.number(knot.x)
+            is_on, x = is_before and knot.at == level, self.number(knot.x)
             if is_before and not (is_on and is_after):
-                yield all_of([*above, f"(< x {x})"])
+                yield all_of([*above, f"(< {own} {x})"])
             if not is_on:
-                above = [f"(< {x} x)"]
+                above = [f"(< {x} {own})"]
         if is_flat[-1]:
             yield all_of(above)
 
     def text(self) -> str:
         """Return all but claims."""
         logic = "QF_NRA" if self.is_product else "QF_LRA"
-        constants = (
-            f"(define-fun |{name}| () Real {text})"
-            for name, text in self._constants.items()
-        )
+        pairs = self._constants.items()
+        constants = (f"(define-fun |{name}| () Real {text})" for name, text in pairs)
         head = [f"(set-logic {logic})", *constants, _PRELUDE]
         return "\n".join([*head, *self._lines]) + "\n"
 

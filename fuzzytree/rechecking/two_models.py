@@ -52,7 +52,10 @@ def recheck_difference(
         CannotRunError: If one of them cannot be read, or the solver fails.
     """
     facts: Difference = built(Difference, read_json(diff, names[0]), names[0])
-    both = Case(facts, Model(old, names[1])), Case(facts, Model(new, names[2]))
+    models = Model(old, names[1]), Model(new, names[2])
+    for whole, of in zip(models, ("old ", "new "), strict=True):
+        whole.put_before_names(of)
+    both = Case(facts, models[0]), Case(facts, models[1])
     report = Report(UNCHECKED, facts.answers)
     decide(Script(), report, [], solver)  # which a program that is missing refuses
     for model, case, content, name in zip(
@@ -124,16 +127,15 @@ def _claims(script: Script, both: tuple[Case, Case], where: str) -> list[Stateme
 
     `where`: empty if they do for any input, also outside of the domain.
     """
-    for case, of in zip(both, ("old ", "new "), strict=True):
-        case.add_to(script, of, is_bounded=bool(where))
+    for case in both:
+        case.add_to(script, is_bounded=bool(where))
     if "missing" not in where:
         require(both[0].model.missing == both[1].model.missing, "of missing values")
     old, new = (
-        (case, [script.symbol(f"{of}{case.name(n)}") for n in case.numbers])
-        for case, of in zip(both, ("old ", "new "), strict=True)
+        (case, [script.symbol(case.name(n)) for n in case.numbers]) for case in both
     )
     claims = [
-        unchanged(f"old {old[0].name(n)}", n, old, new, is_strict=is_strict)
+        unchanged(old[0].name(n), n, old, new, is_strict=is_strict)
         for is_strict in (True, False)
         for n in old[0].numbers
     ]
