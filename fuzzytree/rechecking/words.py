@@ -8,15 +8,10 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 DATE_UNIT = "days since 1970-01-01"
-MISSING = "missing"
-"""The word for the stand-in of a missing value."""
-
-MOST_LISTED = 4096
-"""Whole numbers beyond which shares are those of lengths, and not of counts."""
-
+MISSING = "missing"  # the word for the stand-in of a missing value
+MOST_LISTED = 4096  # beyond, shares are those of lengths, and not of counts
 _EPOCH = datetime.datetime(1970, 1, 1)
 _DAY = 86_400_000_000  # microseconds
-
 
 Column = Any
 """What a model says about an input: its `categories` and `unit`."""
@@ -59,38 +54,26 @@ def listed(side: Side | None) -> list[Fraction]:
     return sorted(values)
 
 
-def stretch(
-    side: Side, low: float | Fraction, high: float | Fraction, *, is_open: bool = False
-) -> Stretch:
-    """Return the values of rows from low to high; where it is open, above low."""
-    first, last = (
-        max(Fraction(side.low), Fraction(low)),
-        min(Fraction(side.high), Fraction(high)),
-    )
-    is_open = is_open and first == low
-    inside: list[Fraction] = [first, last]
+def stretch(side: Side, low: float | Fraction, high: float | Fraction) -> Stretch:
+    """Return the values of rows from low to high."""
+    first = max(Fraction(side.low), Fraction(low))
+    last = min(Fraction(side.high), Fraction(high))
+    inside = [first, last]
     if side.values:
         inside = [v for v in map(Fraction, side.values) if first <= v <= last]
-        inside = inside[1:] if is_open and inside[:1] == [first] else inside
     elif side.is_whole:
-        least = math.floor(first) + 1 if is_open else math.ceil(first)
-        inside = [Fraction(least), Fraction(math.floor(last))]
-    if inside and (
-        inside[0] > inside[-1] or (inside[0] == inside[-1] == low and is_open)
-    ):
+        inside = [Fraction(math.ceil(first)), Fraction(math.floor(last))]
+    if inside and inside[0] > inside[-1]:
         inside = []
     stand_in = side.missing
     has_missing = stand_in is not None and low <= stand_in <= high
-    has_missing &= not (is_open and stand_in == low)
     if has_missing and stand_in is not None and inside:
         is_listed = not side.values or stand_in in side.values
         is_listed &= not side.is_whole or stand_in.is_integer()
         has_missing = not (inside[0] <= stand_in <= inside[-1] and is_listed)
-    return (
-        Stretch(inside[0], inside[-1], has_missing)
-        if inside
-        else Stretch(None, None, has_missing)
-    )
+    if not inside:
+        return Stretch(None, None, has_missing)
+    return Stretch(inside[0], inside[-1], has_missing)
 
 
 def value_word(column: Column, side: Side | None, value: Fraction) -> str:
@@ -126,17 +109,14 @@ def stretch_word(
     part = stretch(side, low, high)
     words: list[str] = []
     if part.low is not None and part.high is not None:
-        first, last = (
-            value_word(column, side, part.low),
-            value_word(column, side, part.high),
-        )
+        ends = [value_word(column, side, end) for end in (part.low, part.high)]
         if column.categories:
-            codes = (
+            codes = [
                 v for v in map(Fraction, side.values) if part.low <= v <= part.high
-            )
+            ]
             words = [value_word(column, side, code) for code in codes]
-        elif first and last:
-            words = [first if first == last else f"{first} to {last}"]
+        elif all(ends):
+            words = [" to ".join(dict.fromkeys(ends))]
         elif not part.has_missing:
             return ""
         else:
