@@ -15,6 +15,7 @@ from fuzzytree.rechecking.claims import (
     BRACKETS,
     PROOFS,
     WITNESSES,
+    Check,
     Statement,
     no_gap,
     not_decided,
@@ -371,7 +372,7 @@ def _check_state(case: Case, report: Report, answer: Answer) -> list[Statement]:
     kind = type(state).__name__.upper()
     if isinstance(state, Proved):
         require(bool(state.how), "it is PROVED, without how")
-        return [*PROOFS.get(name, not_decided)(case, answer)]
+        return _claims(case, answer, PROOFS.get(name, not_decided))
     if isinstance(state, Declined):
         is_reason = state.code in {f"FTD0{n}" for n in range(1, 9)}
         require(is_reason and bool(state.reason), "declined, and not for a reason")
@@ -385,7 +386,7 @@ def _check_state(case: Case, report: Report, answer: Answer) -> list[Statement]:
     if isinstance(state, Witness):
         _check_witness(case, answer, state)
         check = WITNESSES.get(name) or BRACKETS.get(name)
-        claims = [*check(case, answer)] if check else []
+        claims = _claims(case, answer, check) if check else []
         report.counts["answers with a WITNESS, evaluated again"] += 1
         return claims
     require(name not in WITNESSES, "it needs a witness")
@@ -400,7 +401,11 @@ def _check_state(case: Case, report: Report, answer: Answer) -> list[Statement]:
         case.check_point(state.point, state.claims)
     if name not in BRACKETS:
         raise UndecidedError("a bracket is not computed again here")
-    return [*BRACKETS[name](case, answer)]
+    return _claims(case, answer, BRACKETS[name])
+
+
+def _claims(case: Case, answer: Answer, check: Check) -> list[Statement]:
+    return [*(check(case, answer) or ())]
 
 
 def _check_witness(case: Case, answer: Answer, state: Witness) -> None:

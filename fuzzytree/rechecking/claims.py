@@ -62,7 +62,7 @@ def witness_claims(answer: Answer, kind: str) -> list[Claim]:
 # --- rules that win, lead, fire, or are needed
 
 
-def wins(case: Case, answer: Answer) -> Statements:
+def wins(case: Case, answer: Answer) -> None:
     """Check that a rule beats all rivals at a point, or fires there, or leads."""
     (number,) = answer.rules
     rivals = () if answer.message == "FT101.fires" else case.rivals(number)
@@ -77,7 +77,6 @@ def wins(case: Case, answer: Answer) -> Statements:
         least = answer.measure("largest lead, at least")
         is_so = least >= case.settings.lead and lead >= Fraction(least)
         require(is_so, "the rule does not lead by so much there")
-    yield from ()
 
 
 def _strengths(case: Case, answer: Answer) -> list[Fraction]:
@@ -105,10 +104,9 @@ def never_fires(case: Case, answer: Answer) -> Statements:
             yield Statement(text, case.reaches(number, ">", ZERO))
 
 
-def silent(case: Case, answer: Answer) -> Statements:
+def silent(case: Case, answer: Answer) -> None:
     """Check that a rule of a system never fires, as its text says."""
     require(answer.subject in case.model.silent, "its text lets it fire")
-    yield from ()
 
 
 def no_lead(case: Case, answer: Answer) -> Statements:
@@ -121,7 +119,7 @@ def no_lead(case: Case, answer: Answer) -> Statements:
     yield Statement(text, all_of([f"(> {own} {by})", *over]))
 
 
-def ties(case: Case, answer: Answer) -> Statements:
+def ties(case: Case, answer: Answer) -> None:
     """Check that a claim compares rules that tie with all others."""
     every, own = {*case.numbers}, {*answer.rules}
     if answer.code == "FT101":  # others of its class do not matter
@@ -133,7 +131,6 @@ def ties(case: Case, answer: Answer) -> Statements:
     require(is_all, "it is not claimed that they tie above all others")
     is_two = answer.code != "FT202" or len({*map(case.then, answer.rules)}) == 2
     require(is_two, "the rules are of one class")
-    yield from ()
 
 
 def without(case: Case, answer: Answer) -> Rule:
@@ -147,7 +144,7 @@ def without(case: Case, answer: Answer) -> Rule:
     raise DoesNotHoldError("it is of no proposition of the rule")
 
 
-def needed(case: Case, answer: Answer) -> Statements:
+def needed(case: Case, answer: Answer) -> None:
     """Check that without a rule, or a proposition, another class is predicted."""
     point, place = case.point_of(answer.witness.point), answer.rules[0] - 1
     rest = [without(case, answer)] if answer.code == "FT107" else []
@@ -158,7 +155,6 @@ def needed(case: Case, answer: Answer) -> Statements:
     require(before != after and own == case.then(place + 1), "it does not matter there")
     require(answer.facts.get("before") == before, f"the class there is {before!r}")
     require(answer.facts.get("then") == after, f"it becomes {after!r}")
-    yield from ()
 
 
 def not_needed(case: Case, answer: Answer) -> Statements:
@@ -258,7 +254,7 @@ def leaf_region(case: Case, answer: Answer) -> Statements:
     yield from _in_region(case, answer, f"(not {path_to(case, number)})")
 
 
-def raw_rules_differ(case: Case, answer: Answer) -> Statements:
+def raw_rules_differ(case: Case, answer: Answer) -> None:
     """Check that a tree and its raw rules are claimed to answer differently."""
     classes = {c.of: c.label for c in witness_claims(answer, "decides")}
     is_both = classes.keys() == {"tree", "raw rules"}
@@ -267,7 +263,6 @@ def raw_rules_differ(case: Case, answer: Answer) -> Statements:
     require(both[0] != both[1], "the two answers are the same")
     is_so = (answer.facts["then"], answer.facts["other"]) == both
     require(is_so, "the two answer something else")
-    yield from ()
 
 
 def same_class(case: Case, answer: Answer) -> Statements:
@@ -487,7 +482,7 @@ def _rest(case: Case, answer: Answer) -> list[tuple[str, str]]:
     return [label for label in case.model.labels if label not in listed]
 
 
-def counts(case: Case, answer: Answer) -> Statements:
+def counts(case: Case, answer: Answer) -> None:
     """Check that findings and the rest are everything; the rest is not decided."""
     aside = {tuple(label) for o in case.answers_of("FTD.") for label in o.terms}
     answers = case.answers_of(f"{answer.code}.")
@@ -506,10 +501,9 @@ def counts(case: Case, answer: Answer) -> Statements:
     rest = sum(answer.measure(f"pairs {kind}") for kind in kinds)
     require(pairs == rest + listed, f"there are {pairs} pairs of terms")
     raise UndecidedError("areas of terms")
-    yield
 
 
-def unused(case: Case, answer: Answer) -> Statements:
+def unused(case: Case, answer: Answer) -> None:
     """Check that the findings are the terms and variables that no rule uses."""
     model, labels = case.model, case.model.labels_in_use
     names = {variable for variable, _ in labels}
@@ -521,7 +515,6 @@ def unused(case: Case, answer: Answer) -> Statements:
     idle += [f"term {term!r} of {name!r}" for name, term in rest]
     subjects = [o.subject for o in case.answers_of("FT404.unused")]
     require(subjects == idle, "other terms or variables are unused")
-    yield from ()
 
 
 def _check_count(answer: Answer, name: str, count: int) -> None:
@@ -529,13 +522,13 @@ def _check_count(answer: Answer, name: str, count: int) -> None:
     require(answer.measure(name) == count, f"{name}: {count} are counted here")
 
 
-def not_decided(case: Case, answer: Answer) -> Statements:
+def not_decided(case: Case, answer: Answer) -> None:
     """Leave an answer undecided."""
     raise UndecidedError("no solver of lines and polynomials is asked for it")
-    yield
 
 
-Check = Callable[[Case, Answer], Statements]
+Check = Callable[[Case, Answer], Statements | None]
+"""Claims for a solver; None if all is decided here."""
 
 
 def _table(messages: dict[Check, str]) -> dict[str, Check]:
