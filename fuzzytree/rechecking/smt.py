@@ -283,23 +283,26 @@ class Script:
 
     def _text(self, knots: Knots) -> str:
         """Return nested cases from the left to the right."""
+        lines = [self.number(knots[0].before)]
+        slopes = [ZERO]
+        for a, b in itertools.pairwise(knots):
+            slope = (b.before - a.after) / (b.x - a.x)
+            by = f"(* {self.number(slope)} (- x {self.number(a.x)}))"
+            text = f"(+ {self.number(a.after)} {by})" if a.after else by
+            lines.append(text if slope else self.number(a.after))
+            slopes.append(slope)
         text = self.number(knots[-1].after)
-        for a, b in reversed([*zip((None, *knots), knots, strict=False)]):
-            line, end = self._line(a, b), self.number(b.x)
-            if b.at not in (b.before, b.after):
-                text = f"(ite (<= x {end}) {self.number(b.at)}\n  {text})"
-            if line != text:
-                sign = "<=" if b.at == b.before else "<"
-                text = f"(ite ({sign} x {end}) {line}\n  {text})"
+        slopes.append(ZERO)
+        for place in reversed(range(len(knots))):
+            x, before, at, after = knots[place]
+            if before == at == after and slopes[place] == slopes[place + 1]:
+                continue  # a bend of no angle only costs a solver steps
+            end = self.number(x)
+            if at not in (before, after):
+                text = f"(ite (<= x {end}) {self.number(at)}\n  {text})"
+            sign = "<=" if at == before else "<"
+            text = f"(ite ({sign} x {end}) {lines[place]}\n  {text})"
         return text
-
-    def _line(self, start: Knot | None, end: Knot) -> str:
-        """Return the line from a knot, or from the left, to the next one."""
-        if start is None or start.after == end.before:
-            return self.number(end.before)
-        slope = (end.before - start.after) / (end.x - start.x)
-        by = f"(* {self.number(slope)} (- x {self.number(start.x)}))"
-        return f"(+ {self.number(start.after)} {by})" if start.after else by
 
     # --- rules
 
