@@ -128,13 +128,13 @@ def audit(
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
     subject_model = _audited(viewed, model)
     own_file = file if subject_model is model else None
-    answers, why = with_confirmations(
+    confirmed, why = with_confirmations(
         result.answers, lambda: confirm(*_for_solver(result, subject_model, own_file))
     )
     unasked = result.unasked
     if why:
         unasked = (*unasked, f"FT901 {CODES['FT901'].title}: not asked: {why}")
-    result = replace(result, answers=answers, unasked=unasked)
+    result = replace(result, answers=confirmed, unasked=unasked)
     ids = {answer.id for answer in result.findings}
     accepted = tuple(sorted(ids.intersection(selection.accepted)))
     result = replace(result, accepted=accepted)
