@@ -37,8 +37,8 @@ from fuzzytree.auditing.decide import (
     search_boxes,
     states,
 )
-from fuzzytree.auditing.decide import Literal as Degree
 from fuzzytree.auditing.decide.answers import ONE, ZERO
+from fuzzytree.auditing.decide.boxes import Factor
 from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.decide.rules import Norm
 from fuzzytree.auditing.decide.solver import Solver, solver_for
@@ -97,12 +97,10 @@ class Agreement:
             self.ones = Decider(Base([*ones], self.base.variables, domain))
         count = len(old.rules)
         self.groups = range(count), range(count, self.base.count)
-        self._below: dict[tuple[str, Degree, Degree], bool] = {}
-        self._full: bool | None = None
+        self._is_full: bool | None = None
+        self._pairs: list[Pair] | None = None
         self._answers: dict[Question, Answer] = {}
-        self._above: dict[int, list[int]] = {}
-        self._rivals: dict[tuple[int, bool], tuple[tuple[int, ...], tuple[int, ...]]]
-        self._rivals = {}
+        self._lower: dict[tuple[Factor, Factor], bool] = {}
 
     # --- at a point
 
@@ -159,38 +157,57 @@ class Agreement:
             `Proved`: they do. `Witness`: they do not, here. `Bracket`: they can
             differ only where the margin of one of them is at most so large.
         """
-        try:
-            pairs = self._pairs(budget)
-            answer = self._all(pairs, budget.share(1.0 - _LOOSE), is_strict=True)
-        except OutOfStepsError:
-            return states.Bracket(OF, 0.0, 1.0, "the budget was spent")
-        if isinstance(answer, states.Witness):
-            return answer
-        if isinstance(answer, Open):
-            return states.Bracket(OF, 0.0, 1.0, answer.why)
-        try:
-            answer = self._all(pairs, budget, is_strict=False)
-        except OutOfStepsError:
-            answer = Open("")
-        if isinstance(answer, states.Witness):
-            return answer
-        if not isinstance(answer, Proved):
-            return states.Bracket(OF, 0.0, 0.0, _TIES)
+        answer: states.Witness | Proved | Open
+        for is_strict in (True, False):
+            try:
+                share = budget.share(1.0 - _LOOSE) if is_strict else budget
+                answer = self._all(share, is_strict=is_strict)
+            except OutOfStepsError:
+                answer = Open("the budget was spent")
+            if isinstance(answer, states.Witness):
+                return answer
+            if isinstance(answer, Open):
+                why = answer.why if is_strict else _TIES
+                return states.Bracket(OF, 0.0, float(is_strict), why)
         what = "pairs of rules of other classes none decides at one point"
-        return states.Proved(f"of {len(pairs)} {what}")
+        return states.Proved(f"of {len(self._pairs or ())} {what}")
 
-    def _pairs(self, budget: Budget) -> list[Pair]:
+    def _all(
+        self, budget: Budget, *, is_strict: bool
+    ) -> states.Witness | Proved | Open:
+        """Decide all pairs; ties of classes count unless all comparisons are strict."""
+        if self._pairs is None:
+            self._pairs = self._pairs_of_classes(budget)
+        left: list[Pair] = []
+        for pair in self._pairs:
+            answer = self._quick(pair, budget, is_strict=is_strict)
+            if isinstance(answer, Point):
+                witness = self.difference(answer.values)
+                if witness is not None:
+                    return witness
+            if isinstance(answer, Proved):
+                continue
+            if is_strict:
+                left.append(pair)
+                continue
+            result = self._slow([pair], budget, is_strict=is_strict)
+            if not isinstance(result, Proved):
+                return result  # one tie is enough
+        return self._slow(left, budget, is_strict=is_strict)
+
+    def _pairs_of_classes(self, budget: Budget) -> list[Pair]:
         """Return the pairs of other classes that may decide at one point."""
         if self.base.is_empty:
             return []
         old, new = self.groups
         budget.spend(len(old) * len(new))
-        meeting = self._meeting(ONE if self._is_full(budget) else ZERO, budget)
+        is_full = self._has_full_rules(budget)
+        meeting = self._meeting(ONE if is_full else ZERO, budget)
         pairs = [Pair(i, j) for i in old for j in new if meeting[i] >> j & 1]
-        if not self._is_full(budget):
+        if not is_full:
             pairs += [Pair(None, j) for j in new]
             pairs += [Pair(i, None) for i in (*old, None)]
-        return [one for one in pairs if self._label(0, one) != self._label(1, one)]
+        return [pair for pair in pairs if self._label(0, pair) != self._label(1, pair)]
 
     def _label(self, side: Side, pair: Pair) -> str | None:
         place = pair[side]
@@ -204,15 +221,15 @@ class Agreement:
         every = (one for rule in self.base.rules for _, one in rule.literals)
         return all(isinstance(f, Band | Points) for one in every for f in one.functions)
 
-    def _is_full(self, budget: Budget) -> bool:
+    def _has_full_rules(self, budget: Budget) -> bool:
         """Return whether a rule of strength 1 decides everywhere, in both models."""
-        if self._full is None:
+        if self._is_full is None:
             queries = (Question(rivals=(*g,), level=ONE) for g in self.groups)
-            self._full = self.are_trees or (
+            self._is_full = self.are_trees or (
                 self.is_made_of_lines
                 and all(isinstance(self._ask(q, budget), Proved) for q in queries)
             )
-        return self._full
+        return self._is_full
 
     def _meeting(self, level: Fraction, budget: Budget) -> list[int]:
         """Return with which rules each may be above 0, or at 1, on a cell of each axis.
@@ -231,101 +248,56 @@ class Agreement:
                 bits[place] &= own
         return bits
 
-    def _all(
-        self, pairs: Sequence[Pair], budget: Budget, *, is_strict: bool
-    ) -> states.Witness | Proved | Open:
-        """Decide all pairs; ties of classes count unless all comparisons are strict."""
-        left: list[Pair] = []
-        for pair in pairs:
-            answer = self._quick(pair, budget, is_strict=is_strict)
-            if isinstance(answer, Point):
-                witness = self.difference(answer.values)
-                if witness is not None:
-                    return witness
-            if isinstance(answer, Proved):
-                continue
-            if is_strict:
-                left.append(pair)
-                continue
-            if not self.is_made_of_lines:
-                return Open("where curves tie is not looked for")
-            result = self._slow([pair], budget, is_strict=is_strict)
-            if not isinstance(result, Proved):
-                return result  # one tie is enough
-        return self._slow(left, budget, is_strict=is_strict)
-
-    def _slow(
-        self, left: Sequence[Pair], budget: Budget, *, is_strict: bool
-    ) -> states.Witness | Proved | Open:
-        if not left:
-            return Proved("")
-        steps = [self._by_boxes, self._by_solver]
-        if self.base.is_lattice and self.is_made_of_lines:
-            steps.reverse()
-        whys: list[str] = []
-        for step in steps:
-            result = step(left, budget, is_strict)
-            if isinstance(result, Point):
-                witness = self.difference(result.values)
-                if witness is not None:
-                    return witness
-                result = Open("classes tie, or no row is known to have the point")
-            if isinstance(result, Proved):
-                return result
-            whys.append(result.why)
-        return Open("; ".join(whys))
-
     # --- one pair
 
     def rivals(
         self, place: int, *, is_strict: bool
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Return the rules that must be weaker for one to decide, and not stronger."""
-        key = place, is_strict
-        if key not in self._rivals:
-            rules = self.base.rules
-            group = self.groups[rules[place].model]
-            others = [k for k in group if rules[k].then != rules[place].then]
-            before = tuple(k for k in others if is_strict or k < place)
-            after = tuple(k for k in others if not is_strict and k > place)
-            self._rivals[key] = before, after
-        return self._rivals[key]
+        rules = self.base.rules
+        group = self.groups[rules[place].model]
+        others = [k for k in group if rules[k].then != rules[place].then]
+        if is_strict:
+            return (*others,), ()
+        before = tuple(k for k in others if k < place)
+        return before, tuple(k for k in others if k > place)
 
     def _quick(self, pair: Pair, budget: Budget, *, is_strict: bool) -> Answer:
         """Decide a pair by questions of one level, if they suffice."""
-        i, j = pair
-        if i is not None and j is not None and self._is_full(budget):
-            strict = self.rivals(i, is_strict=is_strict)[0]
-            strict += self.rivals(j, is_strict=is_strict)[0]
-            return self._ask(Question((i, j), strict, level=ONE), budget)
         if self._is_ruled_out(pair, is_strict=is_strict):
             return Proved("")
         if not (is_strict or self.is_made_of_lines):
             return Open("where curves tie is not looked for")
-        if i is None and j is None:
-            gap = Question(weak=tuple(range(self.base.count)), level=ZERO)
-            return self._ask(gap, budget)
-        for side, place in enumerate(pair):
-            question = Question(weak=(*self.groups[side],), level=ZERO)
+        rivals = [
+            ((), (*group,))
+            if place is None
+            else self.rivals(place, is_strict=is_strict)
+            for place, group in zip(pair, self.groups, strict=True)
+        ]
+        reach = tuple(place for place in pair if place is not None)
+        if self._is_full:
+            strict = rivals[0][0] + rivals[1][0]
+            return self._ask(Question(reach, strict, level=ONE), budget)
+        if not reach:
+            every = (*range(self.base.count),)
+            return self._ask(Question(weak=every, level=ZERO), budget)
+        for place, (strict, weak) in zip(pair, rivals, strict=True):
+            question = Question(weak=weak, level=ZERO)
             if place is not None:
-                question = Question((place,), *self.rivals(place, is_strict=is_strict))
+                question = Question((place,), strict, weak)
             answer = self._ask(question, budget)
             if isinstance(answer, Proved):
                 return answer
-        if i is None or j is None:
+        if None in pair:
             return Open("")
-        strict, weak = self.rivals(i, is_strict=is_strict)
-        more, others = self.rivals(j, is_strict=is_strict)
-        is_first_lower = not self._rules_above(j, i)  # perhaps
-        is_second_lower = not self._rules_above(i, j)
-        if not (is_first_lower or is_second_lower):  # then they tie
-            question = Question((i, j), strict + more, weak + others)
-            return self._ask(question, budget)
+        stronger = zip(rivals, self._stronger(*reach), strict=True)
+        lower = [of for of, above in stronger if not above]
+        if not lower:  # then they tie
+            lower = [(rivals[0][0] + rivals[1][0], rivals[0][1] + rivals[1][1])]
         answer = Proved("")
-        if is_first_lower:
-            answer = self._ask(Question((i, j), strict, weak), budget)
-        if is_second_lower and isinstance(answer, Proved):
-            answer = self._ask(Question((i, j), more, others), budget)
+        for strict, weak in lower:
+            if isinstance(answer, Proved):
+                answer = self._ask(Question(reach, strict, weak), budget)
         return answer
 
     def _ask(self, question: Question, budget: Budget) -> Answer:
@@ -349,21 +321,25 @@ class Agreement:
             return fires is not None and any(
                 self.is_below(fires, k) for k in self.groups[side]
             )
-        mine, theirs = self._rules_above(j, i), self._rules_above(i, j)
-        if is_strict or not (mine and theirs):
-            return bool(mine and theirs)
-        return min(mine) < i or min(theirs) < j
+        mine, theirs = self._stronger(i, j)
+        is_either = bool(mine and theirs)
+        return is_either and (is_strict or min(mine) < i or min(theirs) < j)
 
-    def _rules_above(self, place: int, other: int) -> list[int]:
-        """Return the rules of another model that are never weaker than a rule.
-
-        They are of the model, but not of the class, of the `other` rule.
-        """
+    def _stronger(self, i: int, j: int) -> tuple[list[int], list[int]]:
+        """Return the rivals of two rules that are never weaker than the other one."""
         rules = self.base.rules
-        if place not in self._above:
-            group = self.groups[1 - rules[place].model]
-            self._above[place] = [k for k in group if self.is_below(place, k)]
-        return [k for k in self._above[place] if rules[k].then != rules[other].then]
+        return (
+            [k for k in self._above[j] if rules[k].then != rules[i].then],
+            [k for k in self._above[i] if rules[k].then != rules[j].then],
+        )
+
+    @cached_property
+    def _above(self) -> list[list[int]]:
+        """For each rule those of the other model that are never weaker."""
+        return [
+            [k for k in self.groups[1 - rule.model] if self.is_below(place, k)]
+            for place, rule in enumerate(self.base.rules)
+        ]
 
     def is_below(self, place: int, other: int) -> bool:
         """Return whether a rule is nowhere stronger than another one, by its parts."""
@@ -372,32 +348,51 @@ class Agreement:
             return False
         left = [*one.literals]
         for key in two.literals:
-            name, degree = key
-            match = key if key in left else None
-            for mine in left if match is None else ():
-                if mine[0] == name and self._is_below_degree(name, mine[1], degree):
-                    match = mine
-            if match is None:
+            matches = [own for own in left if self._is_lower(own, key)]
+            if not matches:
                 return False
             if two.norm == "product":
-                left.remove(match)
+                left.remove(key if key in matches else matches[0])
         return True
 
-    def _is_below_degree(self, name: str, one: Degree, other: Degree) -> bool:
-        key = name, one, other
-        if not self.is_made_of_lines:
-            return False
-        if key not in self._below:
-            bounds = self.base.axes[name].bounds
-            mine, theirs = bounds[one].upper, bounds[other].lower
-            self._below[key] = all(
-                a <= b
-                for values, others in zip(mine[1:], theirs[1:], strict=True)
-                for a, b in zip(values, others, strict=True)
+    def _is_lower(self, one: Factor, other: Factor) -> bool:
+        """Return whether a degree is nowhere above another one."""
+        if one == other or one[0] != other[0] or not self.is_made_of_lines:
+            return one == other
+        key = one, other
+        if key not in self._lower:
+            bounds = self.base.axes[one[0]].bounds
+            mine, theirs = bounds[one[1]].upper, bounds[other[1]].lower
+            sides = zip(mine[1:], theirs[1:], strict=True)
+            self._lower[key] = all(
+                a <= b for side in sides for a, b in zip(*side, strict=True)
             )
-        return self._below[key]
+        return self._lower[key]
 
     # --- several pairs
+
+    def _slow(
+        self, left: Sequence[Pair], budget: Budget, *, is_strict: bool
+    ) -> states.Witness | Proved | Open:
+        if not left:
+            return Proved("")
+        if not (is_strict or self.is_made_of_lines):
+            return Open("where curves tie is not looked for")
+        steps = [self._by_boxes, self._by_solver]
+        if self.base.is_lattice and self.is_made_of_lines:
+            steps.reverse()
+        whys: list[str] = []
+        for step in steps:
+            result = step(left, budget, is_strict)
+            if isinstance(result, Point):
+                witness = self.difference(result.values)
+                if witness is not None:
+                    return witness
+                result = Open("classes tie, or no row is known to have the point")
+            if isinstance(result, Proved):
+                return result
+            whys.append(result.why)
+        return Open("; ".join(whys))
 
     def _by_boxes(
         self, pairs: Sequence[Pair], budget: Budget, is_strict: bool
@@ -432,53 +427,48 @@ class Agreement:
     def _by_solver(
         self, pairs: Sequence[Pair], budget: Budget, is_strict: bool
     ) -> Answer:
+        """Ask z3 for a point of a pair at a time."""
         solver = solver_for(self.base, budget)
         if solver is None:
             return Open("z3 is not installed, which might decide it")
         open_ = 0
         for pair in pairs:
-            answer = self._solved(pair, solver, budget, is_strict=is_strict)
-            if isinstance(answer, Point):
-                if self.difference(answer.values) is not None or not is_strict:
-                    return answer
-                open_ += 1
-            open_ += isinstance(answer, Open)
+            answer = self._solve(pair, solver, budget, is_strict=is_strict)
+            if isinstance(answer, Point) and (
+                self.difference(answer.values) is not None or not is_strict
+            ):
+                return answer
+            open_ += not isinstance(answer, Proved)
         if open_:
             return Open(f"{open_} of {len(pairs)} pairs of rules are open")
         return Proved("")
 
-    def _solved(
+    def _solve(
         self, pair: Pair, solver: Solver, budget: Budget, *, is_strict: bool
     ) -> Answer:
         """Ask z3 for a point of a pair; rivals join when a point needs them."""
-        terms, parts = solver.strengths, list[Any]()
-        for side, place in enumerate(pair):
+        terms, parts = solver.strengths, [solver.z3.BoolVal(True, solver.context)]
+        rest: dict[tuple[int, int, bool], Any] = {}
+        for place, group in zip(pair, self.groups, strict=True):
             if place is None:
-                parts += [terms[k] <= 0 for k in self.groups[side]]
-            else:
-                parts.append(terms[place] > 0)
-        comparisons: set[tuple[int, int]] = set()
+                parts += [terms[k] <= 0 for k in group]
+                continue
+            own = terms[place]
+            parts.append(own > 0)
+            strict, weak = self.rivals(place, is_strict=is_strict)
+            rest |= {(place, k, True): own > terms[k] for k in strict}
+            rest |= {(place, k, False): own >= terms[k] for k in weak}
         while True:
             formula = solver.z3.And(*parts)
             answer = solver.ask_formula(formula, lambda _: True, budget)
             if not isinstance(answer, Point):
                 return answer
             low, high = self.base.strengths(answer.values)
-            more: set[tuple[int, int]] = set()
-            for place in pair:
-                if place is None:
-                    continue
-                strict, weak = self.rivals(place, is_strict=is_strict)
-                stronger = [k for k in strict if high[k] >= low[place]]
-                stronger += [k for k in weak if high[k] > low[place]]
-                if stronger:
-                    more.add((place, max(stronger, key=high.__getitem__)))
+            more = [
+                (place, k, is_less)
+                for place, k, is_less in rest
+                if high[k] > low[place] or (is_less and high[k] == low[place])
+            ]
             if not more:
                 return answer
-            if more <= comparisons:
-                return Open("lines around a curve are too far apart")
-            for place, k in more - comparisons:
-                is_before = is_strict or k < place
-                mine, theirs = terms[place], terms[k]
-                parts.append(mine > theirs if is_before else mine >= theirs)
-            comparisons |= more
+            parts.append(rest.pop(max(more, key=lambda key: high[key[1]])))
