@@ -27,7 +27,7 @@ FILES: Final[Mapping[str, str]] = MappingProxyType(
         "bench.schema.json": "fuzzytree.benchmarking.records:Study",
         "board.schema.json": "fuzzytree.tactile.board_file:BoardFile",
         "check.schema.json": "fuzzytree.model.agreement:Agreement",
-        "diff.schema.json": "fuzzytree.auditing.diff.difference_records:Difference",
+        "diff.schema.json": "fuzzytree.auditing.diff.records:Difference",
         "learn.schema.json": "fuzzytree.api.holdout:Summary",
         "needs.schema.json": "fuzzytree.benchmarking.savings:Footprint",
         "require.schema.json": "fuzzytree.auditing.require.claims:Compliance",

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.auditing.decide.states import Proved
-from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference
+from fuzzytree.auditing.diff.records import Difference
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.exporters import yaml
 from fuzzytree.model import Document, FuzzySystem

@@ -2,14 +2,13 @@
 
 In reading order:
 
-- `difference_records`: a change, its grade, and the whole difference
-- `matching`: which rule corresponds to which, by content
-- `structure`: changes of rules, classes, variables and terms
-- `agreement`: do two models decide alike everywhere
-- `regions`: a box on which they differ
-- `decisions`: where two models decide differently
-- `system_keys`, `system_bounds`, `system_numbers`: how a system computes an output; its
-  number in fractions, and how far two can be apart; what is known of both
-- `system_differences`: the same for fuzzy systems
+- `records`: a change, its grade, and the whole difference
+- `keys`: what curves, conditions and outputs mean, as values that can be compared
+- `matching`: which rule, term or variable corresponds to which, by content
+- `structure`: the changes of rules, classes, variables and terms
+- `samples`: two models side by side, and the rows on which they are compared
+- `agreement`, `regions`: do two models decide alike everywhere; a box where they differ
+- `decisions`: where two rule bases decide differently
+- `bounds`, `numbers`: how far the outputs of two systems are apart
 - `differences`: all of it, for two models
 """

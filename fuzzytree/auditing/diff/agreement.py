@@ -121,31 +121,30 @@ class Agreement:
         has_margin = all(rules[k].then == label for k in others)
         return Prediction(label, rules[first].number, bool(others), has_margin)
 
-    def witness(self, point: Mapping[str, Fraction]) -> states.Witness | None:
-        """Return a point as a witness that both predict otherwise there, if so."""
-        one, other = self.predictions(point)
-        if one.label == other.label:
-            return None
-        return states.Witness(
-            states.coordinates(point),
-            (
-                states.Claim("decides", of="old", label=one.label),
-                states.Claim("decides", of="new", label=other.label),
-            ),
+    def labels(self, point: Mapping[str, Fraction]) -> tuple[str | None, ...]:
+        """Return the classes that both predict at a point."""
+        return tuple(prediction.label for prediction in self.predictions(point))
+
+    def witness(self, point: Mapping[str, Fraction]) -> states.Witness:
+        """Return a point as a witness of what both predict there."""
+        old, new = self.labels(point)
+        claims = (
+            states.Claim("decides", of="old", label=old),
+            states.Claim("decides", of="new", label=new),
         )
+        return states.Witness(states.coordinates(point), claims)
 
     def difference(self, point: Mapping[str, Fraction]) -> states.Witness | None:
-        """Return a point of the domain as such a witness, or the doubles near it.
+        """Return a point of the domain, or the doubles near it, if predictions differ.
 
         A tie of classes must be one of doubles, which rows have.
         """
         near = {name: Fraction(float(x)) for name, x in point.items()}
         for tried in (near, point):
-            is_clear = all(one.has_margin for one in self.predictions(tried))
-            if (tried is near or is_clear) and self.base.contains(tried):
-                witness = self.witness(tried)
-                if witness is not None:
-                    return witness
+            old, new = self.predictions(tried)
+            is_clear = tried is near or (old.has_margin and new.has_margin)
+            if old.label != new.label and is_clear and self.base.contains(tried):
+                return self.witness(tried)
         return None
 
     # --- everywhere

@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import msgspec
 
 from fuzzytree.auditing.decide import Budget
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.states import Proved
-from fuzzytree.auditing.diff.decisions import (
+from fuzzytree.auditing.diff.decisions import class_answers
+from fuzzytree.auditing.diff.numbers import number_answers
+from fuzzytree.auditing.diff.records import ComparedModel, Difference
+from fuzzytree.auditing.diff.samples import (
+    Pair,
     Progress,
-    RulePair,
     all_inputs,
-    decisions,
     silent,
     union,
 )
-from fuzzytree.auditing.diff.difference_records import (
-    Change,
-    ComparedModel,
-    DecisionEvidence,
-    Difference,
-    Draft,
-    grade,
-)
-from fuzzytree.auditing.diff.structure import draft_changes
-from fuzzytree.auditing.diff.system_differences import draft_system_changes
-from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
+from fuzzytree.auditing.diff.structure import Structure
 from fuzzytree.auditing.findings.audit import source_of, with_confirmations
 from fuzzytree.auditing.findings.domains import Limits, Words, domain_of, limited
 from fuzzytree.auditing.findings.locations import ModelFile
@@ -39,7 +29,6 @@ from fuzzytree.model import (
     Document,
     FuzzySystem,
     FuzzyTree,
-    Path,
     RuleBase,
     fingerprint,
     kind_of,
@@ -150,39 +139,43 @@ def difference(
     """
     settings = settings or AuditSettings()
     budget = budget or Budget()
-    both = old, new
-    systems = [one for one in both if isinstance(one, FuzzySystem)]
-    systems = [one for one in systems if as_rules(one, None) is None]
-    if len(systems) == 2:
-        first, second = systems
-        drafts = [*draft_system_changes(first, second)]
-        numbers = SystemPair(first, second, all_inputs(old, new), domain)
-        answers = number_answers(numbers, rows, settings, budget, report)
-        is_equal = any(one.subject == "decisions" for one in answers)  # proved
-        has_number = any(one.is_finding for one in answers)
-        evidence = DecisionEvidence(is_equal=is_equal, has_number=has_number)
-    else:
-        pair = _rule_pair(both, files, domain)
-        report("comparing rules", 0.0)
-        drafts = [*draft_changes(pair.old, pair.new, domain, pair.trees)]
-        report("comparing decisions", 0.1)
-        answers, evidence = decisions(pair, rows, settings, budget, report)
-    changes = [_placed(one, evidence, both, files) for one in drafts]
+    models, inputs = (old, new), all_inputs(old, new)
+    both = tuple(map(_as_rules, models))
+    report("comparing decisions", 0.1)
+    match both:
+        case RuleBase() as first, RuleBase() as second:
+            trees = None
+            if isinstance(old, FuzzyTree) and isinstance(new, FuzzyTree):
+                trees = old, new
+            rules = Pair(first, second, inputs, domain, trees)
+            answers, evidence = class_answers(rules, rows, settings, budget, report)
+        case FuzzySystem() as first, FuzzySystem() as second:
+            systems = Pair(first, second, inputs, domain)
+            answers, evidence = number_answers(systems, rows, settings, budget, report)
+        case _:
+            place = [isinstance(model, FuzzySystem) for model in both].index(True)
+            file = files[place]
+            raise ReadError(
+                f"{file.name if file else models[place].name}: is a fuzzy system whose "
+                "outputs are numbers, and is not compared with rules or a tree"
+            )
+    report("comparing rules", 0.9)
+    changes = Structure(first, second, domain, evidence, models, files).changes
     order = {"breaking": 0, "non-breaking": 1, "cosmetic": 2}
-    one, other = (
+    compared = [
         ComparedModel(
             model.name,
             kind_of(model),
             fingerprint(model),
             source_of(file.name, file.content) if file else None,
         )
-        for model, file in zip(both, files, strict=True)
-    )
+        for model, file in zip(models, files, strict=True)
+    ]
     words = Words(domain, union(old, new).variables)
     result = Difference(
         version(),
-        one,
-        other,
+        compared[0],
+        compared[1],
         data,
         0 if rows is None else rows.values.shape[1],
         words.domain,
@@ -190,7 +183,18 @@ def difference(
         tuple(sorted(changes, key=lambda change: order[change.grade])),
         tuple(map(words.answer, answers)),
     )
-    return _confirmed(result, both)
+    return _confirmed(result, models)
+
+
+def _as_rules(model: Document) -> RuleBase | FuzzySystem:
+    """Return a model as rules; a system whose outputs are numbers as it is."""
+    match model:
+        case FuzzyTree():
+            return rules_from_tree(model)
+        case FuzzySystem():
+            return as_rules(model, None) or model
+        case RuleBase():
+            return model
 
 
 def _confirmed(result: Difference, models: tuple[Document, Document]) -> Difference:
@@ -215,54 +219,3 @@ def _with_reason(answer: AuditAnswer, why: str) -> AuditAnswer:
     how = f"{state.how}; not confirmed: {why}"
     state = msgspec.structs.replace(state, how=how)
     return msgspec.structs.replace(answer, state=state)
-
-
-def _rule_pair(
-    models: Sequence[Document], files: Sequence[ModelFile | None], domain: Domain
-) -> RulePair:
-    """Return two models as rules.
-
-    Raises:
-        ReadError: If the outputs of one are numbers.
-    """
-    rules: list[RuleBase] = []
-    for model, file in zip(models, files, strict=True):
-        known: RuleBase | FuzzySystem | None
-        known = rules_from_tree(model) if isinstance(model, FuzzyTree) else model
-        if isinstance(known, FuzzySystem):
-            known = as_rules(known, None)
-        if known is None:
-            raise ReadError(
-                f"{file.name if file else model.name}: is a fuzzy system whose outputs "
-                "are numbers, and is not compared with rules or a tree"
-            )
-        rules.append(known)
-    old, new = rules
-    trees = [model for model in models if isinstance(model, FuzzyTree)]
-    both = (trees[0], trees[1]) if len(trees) == 2 else None
-    return RulePair(old, new, all_inputs(old, new), domain, both)
-
-
-def _placed(
-    draft: Draft,
-    evidence: DecisionEvidence,
-    models: Sequence[Document],
-    files: Sequence[ModelFile | None],
-) -> Change:
-    """Return a change with its grade and its places; a tree's rules are its leaves."""
-    places = [
-        None if file is None or path is None else file.place(_path(model, path))
-        for file, path, model in zip(files, (draft.old, draft.new), models, strict=True)
-    ]
-    change = grade(draft, evidence)
-    return msgspec.structs.replace(change, old=places[0], new=places[1])
-
-
-def _path(model: Document, path: Path) -> Path:
-    match model:
-        case FuzzyTree() if path[0] == "rules":
-            return ("leaves", *path[1:])
-        case FuzzySystem():  # that stands for rules
-            return ("blocks", 0, *path) if path[:1] == ("rules",) else path
-        case _:
-            return path

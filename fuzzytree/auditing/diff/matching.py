@@ -1,208 +1,215 @@
-"""Match the rules of two rule bases by what they mean, and not by their order.
+"""Match parts of two models by what they mean, and not by their order.
 
-Rules are the same if their propositions have equal curves of the same inputs and their
-classes are equal, whatever terms are called. Others are matched, the nearest first:
-equal propositions and another class; equal words, with curves that changed; some
+Rules are the same if their propositions have equal curves of the same inputs and they
+conclude the same, whatever terms are called. Others are matched, the nearest first:
+equal propositions and another conclusion; equal words, with curves that changed; some
 propositions in common.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Mapping
-from fractions import Fraction
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from types import MappingProxyType
+from typing import NamedTuple, TypeVar
 
+from fuzzytree.auditing.diff.keys import Curves, SystemKeys
+from fuzzytree.formats import conclusions_text, condition_sentence, condition_texts
 from fuzzytree.model import (
-    Part,
-    Points,
+    And,
+    Condition,
+    FuzzySystem,
+    Path,
     Proposition,
-    Rule,
     RuleBase,
-    Shape,
-    shapes_of,
+    proposition_text,
+    questions,
+    sentence,
 )
-from fuzzytree.semantics import points_once
-
-How = Literal["same", "class", "curves", "propositions"]
 
 _MOST_LEFT = 400  # rules on either side, of which each two are compared
 
-AxisKey = str | tuple[Part, ...]
-"""The name of an input, or the summands of a combination."""
-
-PropositionKey = tuple[AxisKey, bool, frozenset[int]]
-NamedKey = tuple[str, bool, frozenset[str]]
-
-
-class Match(NamedTuple):
-    """Two rules that are taken for one.
-
-    Attributes:
-        old: Its number in the old rule base, from 1.
-        new: Its number in the new one.
-        how: `same`: it says the same. `class`: another class alone. `curves`: the same
-            words, of which some mean other curves. `propositions`: some propositions
-            differ.
-    """
-
-    old: int
-    new: int
-    how: How
+Part = TypeVar("Part")
 
 
 class Matching(NamedTuple):
-    """The rules that two rule bases have in common, and the numbers of the others.
+    """The parts that two models have in common, by their places, and the others.
 
     Attributes:
-        left: How many rules were too many to be compared with each other.
+        matches: The old place, the new one, and by which key they are matched.
+        removed: The places of the old ones that are left.
+        added: The places of the new ones.
     """
 
-    matches: tuple[Match, ...]
-    removed: tuple[int, ...]
-    added: tuple[int, ...]
-    left: int
+    matches: list[tuple[int, int, int]]
+    removed: list[int]
+    added: list[int]
 
 
-class Curves:
-    """Numbers for curves: equal ones for curves of equal degrees everywhere."""
-
-    def __init__(self) -> None:
-        self._numbers: dict[Shape, int] = {}
-
-    def number(self, shape: Shape) -> int:
-        """Return the number of a curve."""
-        if isinstance(shape, Points):
-            shape = _without_bends(points_once(shape))
-        return self._numbers.setdefault(shape, len(self._numbers))
-
-
-def _without_bends(points: Points) -> Points:
-    """Return points without those at which the line does not bend."""
-    numbers = (map(Fraction, of) for of in (points.values, points.degrees))
-    pairs = [*zip(*numbers, strict=True)]
-    kept = pairs[:1]
-    for (x, y), (u, v) in itertools.pairwise(pairs[1:]):
-        a, p = kept[-1]
-        if a == x or x == u or (y - p) * (u - x) != (v - y) * (x - a):
-            kept.append((x, y))
-    kept += pairs[1:][-1:]
-    while len(kept) > 1 and kept[0][1] == kept[1][1]:
-        del kept[0]
-    while len(kept) > 1 and kept[-1][1] == kept[-2][1]:
-        del kept[-1]
-    values, degrees = zip(*((float(x), float(y)) for x, y in kept), strict=True)
-    return Points(values, degrees)
+def match_parts(
+    old: list[Part], new: list[Part], *keys: Callable[[Part], Hashable]
+) -> Matching:
+    """Match parts with equal keys, the first with the first, key after key."""
+    removed, added = [*range(len(old))], [*range(len(new))]
+    matches: list[tuple[int, int, int]] = []
+    for number, key in enumerate(keys):
+        waiting: defaultdict[Hashable, list[int]] = defaultdict(list)
+        for b in reversed(added):
+            waiting[key(new[b])].append(b)
+        for a in [*removed]:
+            if waiting[key(old[a])]:
+                b = waiting[key(old[a])].pop()
+                matches.append((a, b, number))
+                removed.remove(a)
+                added.remove(b)
+    return Matching(matches, removed, added)
 
 
-class RuleKeys:
-    """Keys of the rules of a rule base, equal for rules that mean the same."""
+class Operand(NamedTuple):
+    """A proposition of a rule, or a condition that it joins by AND."""
 
-    def __init__(
-        self, rules: RuleBase, curves: Curves, names: Mapping[str, str] | None = None
-    ) -> None:
-        shapes = shapes_of(rules.variables)
-        keys: dict[str, AxisKey] = {v.name: v.parts or v.name for v in rules.variables}
-        numbers = {place: curves.number(shape) for place, shape in shapes.items()}
-        self.rules = rules.rules
-        self.names = names or {}
-        self._propositions: dict[Proposition, PropositionKey] = {}
-        for proposition in {
-            proposition for rule in rules.rules for proposition in rule.when
-        }:
-            terms = frozenset(
-                numbers[proposition.variable, term] for term in proposition.terms
-            )
-            self._propositions[proposition] = (
-                keys[proposition.variable],
-                proposition.negated,
-                terms,
-            )
-
-    def proposition(self, proposition: Proposition) -> PropositionKey:
-        """Return the key of a proposition."""
-        return self._propositions[proposition]
-
-    def then(self, rule: Rule) -> str:
-        """Return the class of a rule, as the other rule base calls it."""
-        return self.names.get(rule.then, rule.then)
-
-    def same(self, rule: Rule) -> Hashable:
-        """Return what rules have in common that say the same."""
-        return self.antecedent(rule), self.then(rule)
-
-    def antecedent(self, rule: Rule) -> Hashable:
-        """Return what rules have in common with the same antecedent."""
-        return frozenset(map(self.proposition, rule.when))
-
-    def words(self, rule: Rule) -> Hashable:
-        """Return what rules have in common that read the same."""
-        return frozenset(map(words_of, rule.when)), self.then(rule)
+    key: Hashable  # what it means
+    words: Hashable  # how it reads, whatever the order of its terms
+    text: str
+    variable: str
 
 
-def words_of(proposition: Proposition) -> NamedKey:
-    """Return how a proposition reads, whatever the order of its terms."""
-    return proposition.variable, proposition.negated, frozenset(proposition.terms)
+class MatchRule(NamedTuple):
+    """A rule of either kind of model, as it is matched."""
+
+    path: Path
+    text: str
+    operands: tuple[Operand, ...]
+    label: str  # what it concludes
+    then: str  # the same, as the other model calls it
+    terms: frozenset[tuple[str, str]]  # of variables, which it names
+    weight: float = 1.0
+    block: int | None = None  # of a system
+
+    @property
+    def antecedent(self) -> Hashable:
+        """What rules have in common with the same antecedent."""
+        return self.block, frozenset(operand.key for operand in self.operands)
+
+    @property
+    def words(self) -> Hashable:
+        """What rules have in common with an antecedent that reads the same."""
+        return self.block, frozenset(operand.words for operand in self.operands)
+
+    def changes(self, new: MatchRule) -> str:
+        """Return what has changed from this rule to a new one."""
+        texts: list[str] = []
+        gone, come = self.unlike(new), new.unlike(self)
+        for operand in gone:
+            match = next((o for o in come if o.variable == operand.variable), None)
+            if match is None:
+                texts.append(f"it no longer has {operand.text!r}")
+            else:
+                come.remove(match)
+                texts.append(f"it has {match.text!r} in place of {operand.text!r}")
+        texts += [f"it also has {operand.text!r}" for operand in come]
+        if self.then != new.then:
+            noun = "class" if self.block is None else "conclusion"
+            texts.append(f"its {noun} is {new.label!r}, and was {self.label!r}")
+        if self.weight != new.weight:
+            texts.append(f"its weight is {new.weight!r}, and was {self.weight!r}")
+        return "; ".join(texts)
+
+    def unlike(self, other: MatchRule) -> list[Operand]:
+        """Return operands that another rule has neither by curve nor by word."""
+        keys = {operand.key for operand in other.operands}
+        words = {operand.words for operand in other.operands}
+        return [o for o in self.operands if o.key not in keys and o.words not in words]
 
 
-def matching(one: RuleKeys, other: RuleKeys) -> Matching:
-    """Match the rules of two rule bases."""
-    old, new = (dict(enumerate(said.rules, 1)) for said in (one, other))
-    matches: list[Match] = []
-    steps: tuple[tuple[How, Callable[[RuleKeys, Rule], Hashable]], ...] = (
-        ("same", RuleKeys.same),
-        ("class", RuleKeys.antecedent),
-        ("curves", RuleKeys.words),
-    )
-    for how, key in steps:
-        pairs = paired(
-            {number: key(one, rule) for number, rule in old.items()},
-            {number: key(other, rule) for number, rule in new.items()},
-        )
-        matches += [Match(a, b, how) for a, b in pairs]
-        for a, b in pairs:
-            del old[a], new[b]
-    left = len(old) + len(new) if max(len(old), len(new)) > _MOST_LEFT else 0
-    if not left:
-        for a, b in _nearest(one, old, other, new):
-            matches.append(Match(a, b, "propositions"))
-            del old[a], new[b]
-    return Matching(tuple(sorted(matches)), tuple(old), tuple(new), left)
-
-
-def paired(
-    old: Mapping[int, Hashable], new: Mapping[int, Hashable]
-) -> list[tuple[int, int]]:
-    """Return pairs of equal keys, the first with the first."""
-    waiting: defaultdict[Hashable, list[int]] = defaultdict(list)
-    for number, key in reversed([*new.items()]):
-        waiting[key].append(number)
-    return [(n, waiting[key].pop()) for n, key in old.items() if waiting.get(key)]
-
-
-def _nearest(
-    one: RuleKeys, old: Mapping[int, Rule], other: RuleKeys, new: Mapping[int, Rule]
-) -> list[tuple[int, int]]:
-    """Return pairs of rules with propositions in common, those with the most first."""
-    scored: list[tuple[float, int, int]] = []
-    keys = {
-        n: [(other.proposition(c), words_of(c)) for c in r.when] for n, r in new.items()
+def rules_to_match(
+    model: RuleBase | FuzzySystem,
+    curves: Curves,
+    names: Mapping[str, str] = MappingProxyType({}),
+) -> list[MatchRule]:
+    """Return the rules of a model; `names`: what the other one calls its classes."""
+    if isinstance(model, FuzzySystem):
+        return [*_system_rules(model, curves)]
+    axes = {v.name: v.parts or v.name for v in model.variables}
+    numbers = {
+        (v.name, t.name): curves.key(t) for v in model.variables for t in v.terms
     }
-    for a, rule in old.items():
-        mine = [(one.proposition(c), words_of(c)) for c in rule.when]
-        for b, match in new.items():
-            common = sum(
-                any(x == y or u == v for y, v in keys[b]) for x, u in mine
-            )  # either the curves are the same or the words
-            score = 2.0 * common / (len(mine) + len(keys[b]) or 1)
-            if common:
-                score += 0.5 * (one.then(rule) == other.then(match))
-                scored.append((-score, a, b))
-    pairs: dict[int, int] = {}
-    taken: set[int] = set()
-    for _, a, b in sorted(scored):
-        if a not in pairs and b not in taken:
-            pairs[a] = b
-            taken.add(b)
-    return list(pairs.items())
+
+    def operand(part: Proposition) -> Operand:
+        name, terms = part.variable, part.terms
+        key = axes[name], part.negated, frozenset(numbers[name, t] for t in terms)
+        words = name, part.negated, frozenset(terms)
+        return Operand(key, words, proposition_text(part), name)
+
+    return [
+        MatchRule(
+            ("rules", place),
+            sentence(rule),
+            tuple(map(operand, rule.when)),
+            rule.then,
+            names.get(rule.then, rule.then),
+            frozenset((part.variable, t) for part in rule.when for t in part.terms),
+        )
+        for place, rule in enumerate(model.rules)
+    ]
+
+
+def _system_rules(system: FuzzySystem, curves: Curves) -> Iterator[MatchRule]:
+    keys = SystemKeys(system, curves=curves)
+    for number, block in enumerate(system.blocks):
+        for place, rule in enumerate(block.rules):
+            parts: tuple[Condition, ...] = (rule.when,) if rule.when else ()
+            if isinstance(rule.when, And):
+                parts = rule.when.parts
+            operands: list[Operand] = []
+            for part in parts:
+                text, key = condition_sentence(part), keys.condition(part, block)
+                name = part.variable if isinstance(part, Proposition) else text
+                operands.append(Operand(key, text, text, name))
+            then = conclusions_text(rule.then)
+            when = " and ".join(condition_texts(rule.when))
+            text = f"IF {when} THEN {then}" if when else f"ALWAYS {then}"
+            terms = {(p.variable, t) for p in questions(rule.when) for t in p.terms}
+            terms |= {(each.output, each.term) for each in rule.then}
+            yield MatchRule(
+                ("blocks", number, "rules", place),
+                text,
+                tuple(operands),
+                then,
+                then,
+                frozenset(terms),
+                rule.weight,
+                number,
+            )
+
+
+SAME, CONCLUSION, CURVES, PROPOSITIONS = range(4)
+"""How rules are matched: as the same; another conclusion alone; the same words, of
+which some mean other curves; some propositions in common."""
+
+
+def match_rules(old: list[MatchRule], new: list[MatchRule]) -> tuple[Matching, int]:
+    """Match the rules of two models; return how many were too many to be compared."""
+    matches, removed, added = match_parts(
+        old,
+        new,
+        lambda rule: (rule.antecedent, rule.then, rule.weight),
+        lambda rule: rule.antecedent,
+        lambda rule: (rule.words, rule.then, rule.weight),
+    )
+    is_large = max(len(removed), len(added)) > _MOST_LEFT
+    scores: list[tuple[float, int, int]] = []
+    for a in () if is_large else removed:
+        for b in added:
+            one, other = old[a], new[b]
+            common = len(one.operands) - len(one.unlike(other))
+            score = 2.0 * common / (len(one.operands) + len(other.operands) or 1)
+            if common and one.block == other.block:
+                scores.append((-score - 0.5 * (one.then == other.then), a, b))
+    for _, a, b in sorted(scores):
+        if a in removed and b in added:
+            matches.append((a, b, PROPOSITIONS))
+            removed.remove(a)
+            added.remove(b)
+    left = len(removed) + len(added) if is_large else 0
+    return Matching(sorted(matches), removed, added), left

@@ -1,374 +1,524 @@
-"""Changes of the structure of rule bases: matched by content, and not by order."""
+"""Changes of the structure of models: matched by content, and not by order.
+
+Inputs are known by their names, combinations by what they sum, terms by their names and
+then by their curves, rules by what they say (`fuzzytree.auditing.diff.matching`). Which
+of several changes moves the number of a system is not looked for.
+"""
 
 from __future__ import annotations
 
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Hashable, Iterator, Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from itertools import zip_longest
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 
 from fuzzytree.auditing.decide.domain import Domain, span
 from fuzzytree.auditing.decide.measures import curve_distance
 from fuzzytree.auditing.decide.states import answer_text, listed
-from fuzzytree.auditing.diff.difference_records import Draft, Shown, renamed_model
+from fuzzytree.auditing.diff.keys import Curves
 from fuzzytree.auditing.diff.matching import (
-    AxisKey,
-    Curves,
-    Match,
+    CURVES,
+    SAME,
     Matching,
-    RuleKeys,
-    matching,
-    words_of,
+    match_parts,
+    match_rules,
+    rules_to_match,
 )
-from fuzzytree.auditing.findings.records import Measure
+from fuzzytree.auditing.diff.records import Change, Evidence, Grade
+from fuzzytree.auditing.findings.locations import ModelFile
+from fuzzytree.auditing.findings.records import FileLocation, Measure
 from fuzzytree.model import (
+    Document,
+    FuzzySystem,
     FuzzyTree,
+    Part,
     Path,
-    Proposition,
-    Rule,
     RuleBase,
-    Term,
+    Semantics,
     Variable,
-    proposition_text,
-    sentence,
 )
 from fuzzytree.numerics import outwards
+from fuzzytree.semantics import shape_of
+
+Shown = Literal["always", "never", "rules", "ties", "uncovered", "any"]
+"""By which differing decision a change is shown to break something: by any; by one
+that a rule concerned makes, or a tie, or that no rule makes; always, or never."""
+
+_Names = Mapping[str, str]
 
 
-def draft_changes(
-    old: RuleBase,
-    new: RuleBase,
-    domain: Domain,
-    trees: tuple[FuzzyTree, FuzzyTree] | None = None,
-) -> Iterator[Draft]:
-    """Yield the changes from an old rule base to a new one."""
-    curves = Curves()
-    names = _renamed_classes(old, new, curves)
-    yield from _class_drafts(old, new, names)
-    yield from _answer_drafts(old, new, names)
-    keys = RuleKeys(old, curves, names), RuleKeys(new, curves)
-    result = matching(*keys)
-    yield from _rule_drafts(result, *keys)
-    yield from variable_drafts(old, new, curves, domain)
-    if trees is not None:
-        yield from set_drafts(*trees, curves)
-    yield from _head_drafts(old, new, result)
+class _Spot(NamedTuple):
+    """A part of a model, where it stands, and the numbers of the rules concerned."""
+
+    path: Path
+    part: Any = None
+    rules: tuple[int, ...] = ()
 
 
-def _head_drafts(old: RuleBase, new: RuleBase, result: Matching) -> Iterator[Draft]:
-    yield from renamed_model(old, new)
-    here: Path = ("columns",)
-    if old.columns != new.columns:
-        text = f"the columns of the training table are {listed(new.columns)}"
-        text += f", and were {listed(old.columns)}"
-        yield Draft("columns", text, "never", here, here)
-    here = ("variables",)
-    if old.inputs != new.inputs and sorted(old.inputs) == sorted(new.inputs):
-        text = f"the inputs stand in another order: {listed(new.inputs)}"
-        yield Draft("input", text, "never", here, here)
-    moved = [
-        (match.old, match.new)
-        for match in result.matches
-        if old.rules[match.old - 1].support != new.rules[match.new - 1].support
-    ]
-    if moved:
-        count = "1 rule is" if len(moved) == 1 else f"{len(moved)} rules are"
-        text = f"{count} supported by another number of rows"
-        was, now = zip(*moved, strict=True)
-        draft = Draft("support", text, "never", old_rules=was, new_rules=now)
-        yield draft._replace(is_harmless=True)
-    yield from _rated_drafts(old, new, result)
+class Structure:
+    """The changes from one model to another, both as rules or both as systems.
 
-
-def _rated_drafts(old: RuleBase, new: RuleBase, result: Matching) -> Iterator[Draft]:
-    """Yield that probabilities of classes changed, which decide no class."""
-    moved = [
-        (match.old, match.new)
-        for match in result.matches
-        if old.rules[match.old - 1].probabilities
-        != new.rules[match.new - 1].probabilities
-    ]
-    if moved or old.semantics.sharpness != new.semantics.sharpness:
-        count = "1 rule has" if len(moved) == 1 else f"{len(moved)} rules have"
-        text = f"{count} other probabilities of classes"
-        if old.semantics.sharpness != new.semantics.sharpness:
-            text += f"; the sharpness is {new.semantics.sharpness or 'none'}"
-            text += f", and was {old.semantics.sharpness or 'none'}"
-        was, now = zip(*moved, strict=True) if moved else ((), ())
-        yield Draft("support", text, "never", old_rules=was, new_rules=now)
-
-
-# --- classes and answers
-
-
-def _renamed_classes(old: RuleBase, new: RuleBase, curves: Curves) -> dict[str, str]:
-    """Return which classes have a new name: those whose antecedents are the same."""
-    come = [label for label in new.classes if label not in old.classes]
-    antecedents: list[defaultdict[str, set[Hashable]]] = []
-    for rules in (old, new):
-        keys = RuleKeys(rules, curves)
-        antecedents.append(defaultdict(set))
-        for rule in rules.rules:
-            antecedents[-1][rule.then].add(keys.antecedent(rule))
-    mine, theirs = antecedents
-    names: dict[str, str] = {}
-    for label in old.classes:
-        if label not in new.classes and mine[label]:
-            match = next((k for k in come if theirs[k] == mine[label]), None)
-            if match is not None and match not in names.values():
-                names[label] = match
-    return names
-
-
-def _class_drafts(
-    old: RuleBase, new: RuleBase, names: Mapping[str, str]
-) -> Iterator[Draft]:
-    here: tuple[Path, Path] = (("classes",), ("classes",))
-    for label, other in names.items():
-        text = f"the class {label!r} is called {other!r}"
-        yield Draft("class", text, "always", *here)
-    for label in old.classes:
-        if label not in new.classes and label not in names:
-            yield Draft("class", f"the class {label!r} was removed", "always", *here)
-    for label in new.classes:
-        if label not in old.classes and label not in names.values():
-            yield Draft("class", f"the class {label!r} was added", "always", *here)
-    if old.classes != new.classes and sorted(old.classes) == sorted(new.classes):
-        text = f"the classes have other numbers: {listed(new.classes)}"
-        yield Draft("class", text, "never", *here)
-
-
-def _answer_drafts(
-    old: RuleBase, new: RuleBase, names: Mapping[str, str]
-) -> Iterator[Draft]:
-    one, other = old.semantics, new.semantics
-    fields: tuple[tuple[str, str, Shown], ...] = (
-        ("uncovered", "where no rule fires", "uncovered"),
-        ("missing", "where a value is missing", "always"),
-    )
-    for field, where, shown in fields:
-        was: str | None = getattr(one, field)
-        now: str | None = getattr(other, field)
-        if (None if was is None else names.get(was, was)) != now:
-            text = f"the answer {where} is {answer_text(now)}"
-            path = ("semantics", field)
-            text += f", and was {answer_text(was)}"
-            yield Draft("answer", text, shown, path, path)
-    if one.label_type != other.label_type:
-        text = f"the label type is {other.label_type or 'text'}"
-        text += f", and was {one.label_type or 'text'}"
-        yield Draft("class", text, "never", ("semantics",), ("semantics",))
-    if one.floor != other.floor:
-        before, after = (
-            "not measured" if floor is msgspec.UNSET else floor
-            for floor in (one.floor, other.floor)
-        )
-        text = f"the floor of strengths is {after}, and was {before}"
-        yield Draft("support", text, "never", ("semantics",), ("semantics",))
-    if one.conjunction != other.conjunction:
-        text = f"the AND of rules is {other.conjunction}, and was {one.conjunction}"
-        path = ("semantics", "conjunction")
-        yield Draft("answer", text, "any", path, path)
-
-
-# --- rules
-
-
-def _rule_drafts(result: Matching, one: RuleKeys, other: RuleKeys) -> Iterator[Draft]:
-    for match in result.matches:
-        if match.how not in ("same", "curves"):  # their terms are reported
-            yield _changed_rule(match, one, other)
-    for number in result.removed:
-        text = f"rule {number} was removed: {sentence(one.rules[number - 1])}"
-        yield Draft("rule", text, "rules", ("rules", number - 1), None, (number,))
-    for number in result.added:
-        text = f"rule {number} is new: {sentence(other.rules[number - 1])}"
-        yield Draft("rule", text, "rules", None, ("rules", number - 1), (), (number,))
-    if result.left:
-        text = f"{result.left} rules are too many to be matched with each other"
-        yield Draft("rule", text, "never", is_harmless=True)
-    yield from _order_drafts(result.matches)
-
-
-def _changed_rule(match: Match, one: RuleKeys, other: RuleKeys) -> Draft:
-    was, now = one.rules[match.old - 1], other.rules[match.new - 1]
-    texts = [*_proposition_texts(was, now, one, other)]
-    if one.then(was) != now.then:
-        texts.append(f"its class is {now.then!r}, and was {was.then!r}")
-    place = "" if match.old == match.new else f" (now {match.new})"
-    text = f"rule {match.old}{place} has changed: {'; '.join(texts)}"
-    paths = ("rules", match.old - 1), ("rules", match.new - 1)
-    return Draft("rule", text, "rules", *paths, (match.old,), (match.new,))
-
-
-def _proposition_texts(
-    was: Rule, now: Rule, one: RuleKeys, other: RuleKeys
-) -> Iterator[str]:
-    """Yield which propositions a rule has lost and gained."""
-    gone = _unlike(was, one, now, other)
-    come = _unlike(now, other, was, one)
-    for proposition in gone:
-        match = next((c for c in come if c.variable == proposition.variable), None)
-        if match is None:
-            yield f"it no longer has {proposition_text(proposition)!r}"
-        else:
-            come.remove(match)
-            before, after = proposition_text(proposition), proposition_text(match)
-            yield f"it has {after!r} in place of {before!r}"
-    for proposition in come:
-        yield f"it also has {proposition_text(proposition)!r}"
-
-
-def _unlike(
-    rule: Rule, keys: RuleKeys, other: Rule, other_keys: RuleKeys
-) -> list[Proposition]:
-    """Return propositions of a rule that another has neither by curve nor word."""
-    known = {other_keys.proposition(c) for c in other.when}
-    words = {words_of(c) for c in other.when}
-    return [
-        c
-        for c in rule.when
-        if keys.proposition(c) not in known and words_of(c) not in words
-    ]
-
-
-def _order_drafts(matches: Sequence[Match]) -> Iterator[Draft]:
-    """Yield that rules stand in another order, as many as were overtaken."""
-    count = len(matches) - _longest_run([match.new for match in matches])
-    if count:
-        text = "1 rule stands" if count == 1 else f"{count} rules stand"
-        text += " at another place among the others, which matters where two are "
-        text += "equally strong"
-        yield Draft("order", text, "ties", ("rules",), ("rules",))
-
-
-def _longest_run(numbers: Sequence[int]) -> int:
-    """Return how many numbers of a list can stay where they are: its longest rise."""
-    ends: list[int] = []
-    for number in numbers:
-        place = bisect_left(ends, number)
-        ends[place : place + 1] = [number]
-    return len(ends)
-
-
-Users = Mapping[tuple[str, str], tuple[int, ...]]
-"""The numbers of the rules that name a term, by variable and term."""
-
-
-def variable_drafts(
-    old: RuleBase, new: RuleBase, curves: Curves, domain: Domain
-) -> Iterator[Draft]:
-    """Yield the changes of the variables of a rule base.
-
-    Inputs are known by their names, combinations by what they sum.
+    Args:
+        old: The first one.
+        new: The second one.
+        domain: Where they are compared.
+        evidence: How decisions that differ come about.
+        models: The two as their files have them.
+        files: The files.
     """
-    mine, theirs = (
-        {_key(v): (k, v) for k, v in enumerate(model.variables)} for model in (old, new)
-    )
-    users = _users(old), _users(new)
-    pairs = [(key, key) for key in mine if key in theirs]
-    lost = [key for key in mine if key not in theirs]
-    come = [key for key in theirs if key not in mine]
-    for key in list(lost):
-        place, variable = mine[key]
-        twin = next((k for k in come if theirs[k][1].name == variable.name), None)
-        if twin is not None:
-            lost.remove(key)
-            come.remove(twin)
-            pairs.append((key, twin))
-            yield _summed(mine[key], theirs[twin], users)
-    for key in lost:
-        yield _alone(*mine[key], users[0], is_new=False)
-    for key in come:
-        yield _alone(*theirs[key], users[1], is_new=True)
-    for one, other in pairs:
-        (place, variable), (at, match) = mine[one], theirs[other]
-        paths: tuple[Path, Path] = (("variables", place), ("variables", at))
-        yield from _fact_drafts(variable, match, paths)
-        ends = span(variable, domain)
-        yield from _term_drafts(variable, match, paths, users, curves, ends)
 
+    def __init__(
+        self,
+        old: RuleBase | FuzzySystem,
+        new: RuleBase | FuzzySystem,
+        domain: Domain,
+        evidence: Evidence,
+        models: tuple[Document, Document],
+        files: tuple[ModelFile | None, ModelFile | None],
+    ) -> None:
+        self.domain, self.evidence = domain, evidence
+        self.models, self.files = models, files
+        self.is_system, self.curves = isinstance(new, FuzzySystem), Curves()
+        self.users: list[dict[tuple[str, str], tuple[int, ...]]] = []
+        for model in (old, new):
+            users: defaultdict[tuple[str, str], tuple[int, ...]] = defaultdict(tuple)
+            for number, rule in enumerate(rules_to_match(model, self.curves), 1):
+                for term in rule.terms:
+                    users[term] += (number,)
+            self.users.append(users)
+        self.changes: list[Change] = []
+        self._compare(old, new)
 
-def _key(variable: Variable) -> AxisKey:
-    return variable.parts or variable.name
-
-
-def _alone(place: int, variable: Variable, users: Users, *, is_new: bool) -> Draft:
-    """Return that an input or a combination is new, or was removed."""
-    parts = [part.input for part in variable.parts]
-    noun = "combination" if parts else "input"
-    text = f"the {noun} {variable.name!r}"
-    if is_new and parts:
-        text += f" of {listed(parts)}"
-    text += " is new" if is_new else " was removed"
-    if is_new and not parts:
-        text += ", so that rows need it"
-    path: Path = ("variables", place)
-    rules = _users_of(variable, users) if parts else ()
-    draft = Draft(noun, text, "rules" if parts else "always")
-    if is_new:
-        return draft._replace(new=path, new_rules=rules)
-    return draft._replace(old=path, old_rules=rules)
-
-
-def _summed(
-    was: tuple[int, Variable], now: tuple[int, Variable], users: tuple[Users, Users]
-) -> Draft:
-    """Return that a variable of one name looks at something else."""
-    (place, old), (at, new) = was, now
-    text = f"{new.name!r} sums other inputs or weights"
-    one, other = ([part.input for part in variable.parts] for variable in (old, new))
-    gone = [name for name in one if name not in other]
-    come = [name for name in other if name not in one]
-    if gone:
-        text += f", without {listed(gone)}"
-    if come:
-        text += f", with {listed(come)}"
-    if not (gone or come):
-        text += ": its weights, centres or order have changed"
-    shown: Shown = "rules" if old.parts and new.parts else "always"
-    paths = ("variables", place), ("variables", at)
-    rules = _users_of(old, users[0]), _users_of(new, users[1])
-    return Draft("combination", text, shown, *paths, *rules)
-
-
-def _users_of(variable: Variable, users: Users) -> tuple[int, ...]:
-    """Return the numbers of the rules that use a variable."""
-    known = (rules for (name, _), rules in users.items() if name == variable.name)
-    return tuple(sorted({number for rules in known for number in rules}))
-
-
-def _users(rules: RuleBase) -> Users:
-    uses: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
-    for number, rule in enumerate(rules.rules, 1):
-        named = {
-            (proposition.variable, t)
-            for proposition in rule.when
-            for t in proposition.terms
+    def _report(
+        self,
+        part: str,
+        sentence: str,
+        shown: Shown,
+        old: _Spot | None = None,
+        new: _Spot | None = None,
+        measures: tuple[Measure, ...] = (),
+        *,
+        is_harmless: bool = False,
+    ) -> None:
+        """Keep a change with its grade; one that is harmless is for people only."""
+        evidence = self.evidence
+        old_rules, new_rules = (spot.rules if spot else () for spot in (old, new))
+        shows = {
+            "always": True,
+            "never": False,
+            "any": evidence.has_any,
+            "ties": evidence.has_tie or evidence.has_number,
+            "uncovered": evidence.has_none,
+            "rules": evidence.has_number
+            or not evidence.old_rules.isdisjoint(old_rules)
+            or not evidence.new_rules.isdisjoint(new_rules),
         }
-        for term in named:
-            uses[term].append(number)
-    return {term: tuple(numbers) for term, numbers in uses.items()}
+        grade: Grade = "breaking" if shows[shown] else "non-breaking"
+        grade = "cosmetic" if is_harmless else grade
+        is_sure = grade != "non-breaking" or shown == "never" or evidence.is_equal
+        places = self._place(0, old), self._place(1, new)
+        change = Change(
+            grade, is_sure, part, sentence, old_rules, new_rules, measures, *places
+        )
+        self.changes.append(change)
+
+    def _place(self, side: int, spot: _Spot | None) -> FileLocation | None:
+        """Return where a part stands in the file of its model."""
+        file, model = self.files[side], self.models[side]
+        if file is None or spot is None or not spot.path:
+            return None
+        path = spot.path
+        if path[0] == "rules" and isinstance(model, FuzzyTree):
+            path = ("leaves", *path[1:])
+        elif path[0] == "rules" and isinstance(model, FuzzySystem):
+            path = ("blocks", 0, *path)
+        return file.place(path)
+
+    def _report_name(self, text: str, old: _Spot, new: _Spot | None = None) -> None:
+        self._report("name", text, "never", old, new or old, is_harmless=True)
+
+    def _report_fact(
+        self, part: str, what: str, was: object, now: object, shown: Shown, *path: str
+    ) -> None:
+        """Report that something is another one, if it is."""
+        if was != now:
+            here = _Spot(path)
+            self._report(part, f"{what} {now}, and was {was}", shown, here, here)
+
+    def _compare(
+        self, old: RuleBase | FuzzySystem, new: RuleBase | FuzzySystem
+    ) -> None:
+        names: dict[str, str] = {}
+        if isinstance(old, RuleBase) and isinstance(new, RuleBase):
+            names = self._compare_classes(old, new)
+            self._compare_semantics(old.semantics, new.semantics, names)
+        matching = self._compare_rules(old, new, names)
+        self._compare_variables("variables", old.variables, new.variables)
+        if isinstance(old, FuzzySystem) and isinstance(new, FuzzySystem):
+            self._compare_variables("outputs", old.outputs, new.outputs)
+            self._compare_blocks(old, new)
+            if old.note != new.note:
+                self._report_name("the note has changed", _Spot(("note",)))
+        match self.models:
+            case FuzzyTree() as tree, FuzzyTree() as other:
+                self._compare_sets(tree, other)
+            case _:
+                pass
+        if old.name != new.name:
+            text = f"the model {old.name!r} is called {new.name!r}"
+            self._report_name(text, _Spot(("name",)))
+        if isinstance(old, RuleBase) and isinstance(new, RuleBase):
+            text = "the columns of the training table are"
+            columns = listed(old.columns), listed(new.columns)
+            self._report_fact("columns", text, *columns, "never", "columns")
+            if old.inputs != new.inputs and sorted(old.inputs) == sorted(new.inputs):
+                text = f"the inputs stand in another order: {listed(new.inputs)}"
+                here = _Spot(("variables",))
+                self._report("input", text, "never", here, here)
+            self._compare_probabilities(old, new, matching)
+
+    # --- class rules
+
+    def _compare_classes(self, old: RuleBase, new: RuleBase) -> dict[str, str]:
+        """Return new names of classes: those with equal antecedents are the same."""
+
+        def labels(model: RuleBase) -> list[tuple[str, Hashable]]:
+            rules = rules_to_match(model, self.curves)
+            return [
+                (label, frozenset(r.antecedent for r in rules if r.then == label))
+                for label in model.classes
+            ]
+
+        matches, removed, added = match_parts(
+            labels(old),
+            labels(new),
+            lambda label: label[0],
+            lambda label: label[1] or label[0],
+        )
+        names = {
+            old.classes[a]: new.classes[b] for a, b, is_renamed in matches if is_renamed
+        }
+        texts = [f"{label!r} is called {name!r}" for label, name in names.items()]
+        texts += [f"{old.classes[a]!r} was removed" for a in removed]
+        texts += [f"{new.classes[b]!r} was added" for b in added]
+        here = _Spot(("classes",))
+        for text in texts:
+            self._report("class", f"the class {text}", "always", here, here)
+        if old.classes != new.classes and sorted(old.classes) == sorted(new.classes):
+            text = f"the classes have other numbers: {listed(new.classes)}"
+            self._report("class", text, "never", here, here)
+        return names
+
+    def _compare_semantics(self, old: Semantics, new: Semantics, names: _Names) -> None:
+        cases: tuple[tuple[str, str, Shown], ...] = (
+            ("uncovered", "no rule fires", "uncovered"),
+            ("missing", "a value is missing", "always"),
+        )
+        for key, case, shown in cases:
+            was, now = getattr(old, key), getattr(new, key)
+            texts = answer_text(names.get(was, was)), answer_text(now)
+            text = f"the answer where {case} is"
+            self._report_fact("answer", text, *texts, shown, "semantics", key)
+        types = old.label_type or "text", new.label_type or "text"
+        was, now = (
+            "not measured" if floor is msgspec.UNSET else floor
+            for floor in (old.floor, new.floor)
+        )
+        report, root = self._report_fact, "semantics"
+        report("class", "the label type is", *types, "never", root)
+        report("support", "the floor of strengths is", was, now, "never", root)
+        norms = old.conjunction, new.conjunction
+        report("answer", "the AND of rules is", *norms, "any", root, "conjunction")
+
+    def _compare_probabilities(
+        self, old: RuleBase, new: RuleBase, pairs: Matching
+    ) -> None:
+        """Report other supports and probabilities, which decide no class."""
+        was, now = old.semantics.sharpness, new.semantics.sharpness
+        sharpness = f"; the sharpness is {now or 'none'}, and was {was or 'none'}"
+        for field, verbs, what in (
+            ("support", ("is", "are"), "supported by another number of rows"),
+            ("probabilities", ("has", "have"), "other probabilities of classes"),
+        ):
+            rules = [
+                (a + 1, b + 1)
+                for a, b, _ in pairs.matches
+                if getattr(old.rules[a], field) != getattr(new.rules[b], field)
+            ]
+            is_support, count = field == "support", len(rules)
+            if rules or not (is_support or was == now):
+                noun = f"rule {verbs[0]}" if count == 1 else f"rules {verbs[1]}"
+                text = f"{count} {noun} {what}"
+                text += "" if is_support or was == now else sharpness
+                one = _Spot((), rules=tuple(a for a, _ in rules))
+                other = _Spot((), rules=tuple(b for _, b in rules))
+                self._report(
+                    "support", text, "never", one, other, is_harmless=is_support
+                )
+
+    def _compare_sets(self, old: FuzzyTree, new: FuzzyTree) -> None:
+        """Report which fitted sets of trees differ: only raw rules use them."""
+        mine, theirs = (
+            {
+                (s.variable, t.name): self.curves.key(t)
+                for s in tree.sets
+                for t in s.terms
+            }
+            for tree in (old, new)
+        )
+        both, here = mine.keys() & theirs.keys(), _Spot(("sets",))
+        counts = {
+            "changed": sum(mine[key] != theirs[key] for key in both),
+            "removed": len(mine) - len(both),
+            "new": len(theirs) - len(both),
+        }
+        texts = [f"{count} {what}" for what, count in counts.items() if count]
+        if texts:
+            text = f"of the fitted sets {', '.join(texts)}; only raw rules use them"
+            self._report("term", text, "never", here, here)
+
+    # --- systems
+
+    def _compare_blocks(self, old: FuzzySystem, new: FuzzySystem) -> None:
+        for place, (was, now) in enumerate(zip_longest(old.blocks, new.blocks)):
+            if was and now:
+                of = f" of block {place + 1}" if place else ""
+                one, other = (_Spot(("blocks", place), block) for block in (was, now))
+                self._compare_fields("block", of, one, other, ("rules",))
+            else:
+                text = f"block {place + 1} {'was removed' if was else 'is new'}"
+                sides = _side(_Spot(("blocks", place)), is_new=was is None)
+                self._report("block", text, "any", *sides)
+
+    def _compare_fields(
+        self, part: str, of: str, old: _Spot, new: _Spot, skip: Collection[str]
+    ) -> None:
+        """Report what differs of two parts in other fields."""
+        for key in old.part.__struct_fields__:
+            was, now = getattr(old.part, key), getattr(new.part, key)
+            if key in skip or was == now:
+                continue
+            text = f"the {key}{of} is {_text(now)}, and was {_text(was)}"
+            if key == "clips":
+                still = "now" if now else "no longer"
+                text = f"values{of} are {still} clamped to its range"
+            self._report(part, text, "any", old, new, is_harmless=key == "name")
+
+    # --- rules
+
+    def _compare_rules(
+        self, old: RuleBase | FuzzySystem, new: RuleBase | FuzzySystem, names: _Names
+    ) -> Matching:
+        mine = rules_to_match(old, self.curves, names)
+        theirs = rules_to_match(new, self.curves)
+        matching, left = match_rules(mine, theirs)
+        for a, b, how in matching.matches:
+            if how not in (SAME, CURVES):  # their terms are reported
+                place = "" if a == b else f" (now {b + 1})"
+                text = f"rule {a + 1}{place} has changed: {mine[a].changes(theirs[b])}"
+                spots = (
+                    _Spot(mine[a].path, rules=(a + 1,)),
+                    _Spot(theirs[b].path, rules=(b + 1,)),
+                )
+                self._report("rule", text, "rules", *spots)
+        for a in matching.removed:
+            text = f"rule {a + 1} was removed: {mine[a].text}"
+            self._report("rule", text, "rules", _Spot(mine[a].path, rules=(a + 1,)))
+        for b in matching.added:
+            text = f"rule {b + 1} is new: {theirs[b].text}"
+            self._report(
+                "rule", text, "rules", None, _Spot(theirs[b].path, rules=(b + 1,))
+            )
+        if left:
+            text = f"{left} rules are too many to be matched with each other"
+            self._report("rule", text, "never", is_harmless=True)
+        ends: list[int] = []  # of the longest rises: what can stay where it is
+        for _, b, _ in matching.matches:
+            at = bisect_left(ends, b)
+            ends[at : at + 1] = [b]
+        count = len(matching.matches) - len(ends)
+        if count:
+            text = "1 rule stands" if count == 1 else f"{count} rules stand"
+            text += " at another place among the others"
+            if not self.is_system:
+                text += ", which matters where two are equally strong"
+            here = _Spot(("blocks",) if self.is_system else ("rules",))
+            self._report("order", text, "ties", here, here)
+        return matching
+
+    # --- variables
+
+    def _compare_variables(
+        self, key: str, old: Sequence[Any], new: Sequence[Any]
+    ) -> None:
+        """Compare inputs and combinations, or outputs."""
+        mine, theirs = (
+            [
+                _Spot((key, place), variable, self._users_of(side, variable))
+                for place, variable in enumerate(variables)
+            ]
+            for side, variables in enumerate((old, new))
+        )
+        matches, removed, added = match_parts(
+            mine,
+            theirs,
+            lambda spot: _parts(spot.part) or spot.part.name,
+            lambda spot: spot.part.name,
+        )
+        for a, b, is_other in matches:
+            if is_other:
+                self._report_sums(mine[a], theirs[b])
+        for a in removed:
+            self._report_alone(key, mine[a], is_new=False)
+        for b in added:
+            self._report_alone(key, theirs[b], is_new=True)
+        for a, b, _ in matches:
+            was, now = mine[a]._replace(rules=()), theirs[b]._replace(rules=())
+            self._compare_facts(key, was, now)
+            self._compare_terms(was, now)
+
+    def _users_of(self, side: int, variable: Any) -> tuple[int, ...]:
+        """Return the numbers of the rules that use a combination."""
+        users = self.users[side].items() if _parts(variable) else ()
+        return tuple(
+            sorted({n for (name, _), of in users if name == variable.name for n in of})
+        )
+
+    def _report_alone(self, key: str, spot: _Spot, *, is_new: bool) -> None:
+        """Report that an input, an output or a combination is new, or was removed."""
+        noun, parts = _NOUNS[key], _parts(spot.part)
+        text = f"the {noun} {spot.part.name!r}"
+        shown: Shown = "never" if is_new and noun == "output" else "always"
+        if parts:
+            noun, shown = "combination", "rules"
+            text = f"the combination {spot.part.name!r}"
+            text += f" of {listed([part.input for part in parts])}" if is_new else ""
+        text += " is new" if is_new else " was removed"
+        if is_new and noun == "input":
+            text += ", so that rows need it"
+        self._report(noun, text, shown, *_side(spot, is_new=is_new))
+
+    def _report_sums(self, old: _Spot, new: _Spot) -> None:
+        """Report that a variable of one name looks at something else."""
+        mine, theirs = ([part.input for part in _parts(s.part)] for s in (old, new))
+        gone = [name for name in mine if name not in theirs]
+        come = [name for name in theirs if name not in mine]
+        text = f"{new.part.name!r} sums other inputs or weights"
+        text += f", without {listed(gone)}" if gone else ""
+        text += f", with {listed(come)}" if come else ""
+        if not (gone or come):
+            text += ": its weights, centres or order have changed"
+        shown: Shown = "rules" if mine and theirs else "always"
+        self._report("combination", text, shown, old, new)
+
+    def _compare_facts(self, key: str, was: _Spot, now: _Spot) -> None:
+        """Report what differs of a variable beside its terms."""
+        old, new, of = was.part, now.part, f" of {now.part.name!r}"
+        if old.name != new.name:
+            text = f"the combination {old.name!r} is called {new.name!r}"
+            self._report_name(text, was, now)
+        if old.unit != new.unit:
+            text = f"the unit{of} is {new.unit!r}, and was {old.unit!r}"
+            self._report("unit", text, "never", was, now, is_harmless=True)
+        if (old.low, old.high) != (new.low, new.high):
+            text = f"the range{of} is {_range(new)}, and was {_range(old)}"
+            self._report("range", text, "any" if self.is_system else "never", was, now)
+        skip = ("name", "unit", "low", "high", "terms", "parts")
+        self._compare_fields(_NOUNS[key], of, was, now, skip)
+
+    def _compare_terms(self, was: _Spot, now: _Spot) -> None:
+        """Report what differs of a variable's terms, by name first, then by curve."""
+        old, new = was.part, now.part
+        mine, theirs = (
+            [
+                _Spot(
+                    (*spot.path, "terms", n),
+                    term,
+                    users.get((variable.name, term.name), ()),
+                )
+                for n, term in enumerate(variable.terms)
+            ]
+            for spot, variable, users in zip(
+                (was, now), (old, new), self.users, strict=True
+            )
+        )
+        matches, removed, added = match_parts(
+            mine,
+            theirs,
+            lambda spot: spot.part.name,
+            lambda spot: self.curves.key(spot.part),
+        )
+        for a, b, is_renamed in matches:
+            one, other = mine[a], theirs[b]
+            name = f"{one.part.name!r} of "
+            if is_renamed:
+                text = f"the term {name}{old.name!r} is called {other.part.name!r}"
+                self._report_name(
+                    text, one._replace(rules=()), other._replace(rules=())
+                )
+            elif self.curves.key(one.part) != self.curves.key(other.part):
+                text = f"the curve of {name}{new.name!r} has changed"
+                self._report_curve(text, old, one, other)
+        for is_used in (True, False):
+            gone = [mine[a] for a in removed if bool(mine[a].rules) is is_used]
+            come = [theirs[b] for b in added if bool(theirs[b].rules) is is_used]
+            self._report_terms(was, gone, is_new=False)
+            self._report_terms(now, come, is_new=True)
+
+    def _report_terms(self, of: _Spot, terms: list[_Spot], *, is_new: bool) -> None:
+        """Report that terms of a variable are new or gone, all used or all not."""
+        if not terms:
+            return
+        rules = tuple(sorted({number for term in terms for number in term.rules}))
+        verb = "term was" if len(terms) == 1 else "terms were"
+        verb += " added" if is_new else " removed"
+        names = listed([term.part.name for term in terms])
+        text = f"of {of.part.name!r} {len(terms)} {verb}: {names}"
+        text += "" if rules else ", which no rule uses"
+        spot = _Spot((*of.path, "terms"), rules=rules)
+        is_harmless = not rules and isinstance(of.part, Variable)
+        sides = _side(spot, is_new=is_new)
+        self._report("term", text, "rules", *sides, is_harmless=is_harmless)
+
+    def _report_curve(self, text: str, variable: Any, old: _Spot, new: _Spot) -> None:
+        """Report that a curve has changed, with how far the two are apart."""
+        measures: tuple[Measure, ...] = ()
+        one, other = shape_of(old.part.function), shape_of(new.part.function)
+        heights = {old.part.height, new.part.height}
+        if isinstance(variable, Variable) and one and other and heights == {1.0}:
+            low, high = span(variable, self.domain)
+            if low <= high:
+                distance = curve_distance(one, other, low, high)
+                most, at = outwards(distance.high)[1], float(distance.at)
+                exact = str(distance.low) if distance.low == distance.high else None
+                near = f", by {most:.3g} at most, near {at:.6g}"
+                text += near if distance.high else " outside the domain"
+                measures = (
+                    Measure("largest difference", most, exact),
+                    Measure("at least", outwards(distance.low)[0], str(distance.low)),
+                    Measure("place of the largest difference", at, str(distance.at)),
+                )
+        is_unused = not (old.rules or new.rules)
+        self._report("term", text, "rules", old, new, measures, is_harmless=is_unused)
 
 
-def _fact_drafts(
-    old: Variable, new: Variable, paths: tuple[Path, Path]
-) -> Iterator[Draft]:
-    """Yield what differs of a variable beside its terms."""
-    if old.name != new.name:
-        text = f"the combination {old.name!r} is called {new.name!r}"
-        yield Draft("name", text, "never", *paths, is_harmless=True)
-    if old.unit != new.unit:
-        text = f"the unit of {new.name!r} is {new.unit!r}, and was {old.unit!r}"
-        yield Draft("unit", text, "never", *paths, is_harmless=True)
-    if (old.low, old.high) != (new.low, new.high):
-        text = f"the range of {new.name!r} is {_range(new)}, and was {_range(old)}"
-        yield Draft("range", text, "never", *paths)
+_NOUNS: Mapping[str, str] = {"variables": "input", "outputs": "output"}
 
 
-def _range(variable: Variable) -> str:
+def _side(spot: _Spot, *, is_new: bool) -> tuple[_Spot | None, _Spot | None]:
+    """Return a part of one model alone."""
+    return (None, spot) if is_new else (spot, None)
+
+
+def _parts(variable: Any) -> tuple[Part, ...]:
+    """Return what a variable sums; nothing for an input or an output."""
+    return variable.parts if isinstance(variable, Variable) else ()
+
+
+def _range(variable: Any) -> str:
     if variable.low is None and variable.high is None:
         return "not declared"
     low = "-inf" if variable.low is None else f"{variable.low!r}"
@@ -376,111 +526,7 @@ def _range(variable: Variable) -> str:
     return f"{low} to {high}"
 
 
-def _term_drafts(
-    old: Variable,
-    new: Variable,
-    paths: tuple[Path, Path],
-    users: tuple[Users, Users],
-    curves: Curves,
-    ends: tuple[Fraction, Fraction],
-) -> Iterator[Draft]:
-    """Yield what differs of a variable's terms, by name first and then by curve."""
-    mine = {term.name: (k, term) for k, term in enumerate(old.terms)}
-    theirs = {term.name: (k, term) for k, term in enumerate(new.terms)}
-    for name in (n for n in mine if n in theirs):
-        (a, term), (b, other) = mine[name], theirs[name]
-        if curves.number(term.shape) != curves.number(other.shape):
-            yield _changed_term(
-                new.name,
-                (term, other),
-                ((*paths[0], "terms", a), (*paths[1], "terms", b)),
-                (
-                    users[0].get((old.name, name), ()),
-                    users[1].get((new.name, name), ()),
-                ),
-                ends,
-            )
-    gone = [n for n in mine if n not in theirs]
-    come = [n for n in theirs if n not in mine]
-    for name in list(gone):
-        a, term = mine[name]
-        number = curves.number(term.shape)
-        twin = next(
-            (n for n in come if curves.number(theirs[n][1].shape) == number), None
-        )
-        if twin is not None:
-            gone.remove(name)
-            come.remove(twin)
-            here: Path = (*paths[0], "terms", a)
-            there: Path = (*paths[1], "terms", theirs[twin][0])
-            text = f"the term {name!r} of {old.name!r} is called {twin!r}"
-            yield Draft("name", text, "never", here, there, is_harmless=True)
-    for is_used in (True, False):
-        removed = [n for n in gone if bool(users[0].get((old.name, n))) is is_used]
-        added = [n for n in come if bool(users[1].get((new.name, n))) is is_used]
-        if removed:
-            yield _terms(old.name, removed, "removed", users[0], (*paths[0], "terms"))
-        if added:
-            yield _terms(new.name, added, "added", users[1], (*paths[1], "terms"))
-
-
-def _terms(
-    variable: str, names: list[str], what: str, users: Users, path: Path
-) -> Draft:
-    """Return that terms of a variable were removed or added, all used or all not."""
-    rules = sorted({n for name in names for n in users.get((variable, name), ())})
-    verb = "term was" if len(names) == 1 else "terms were"
-    text = f"of {variable!r} {len(names)} {verb} {what}: {listed(names)}"
-    text += "" if rules else ", which no rule uses"
-    old, new = (tuple(rules), ()) if what == "removed" else ((), tuple(rules))
-    here, there = (path, None) if what == "removed" else (None, path)
-    return Draft("term", text, "rules", here, there, old, new, is_harmless=not rules)
-
-
-def _changed_term(
-    variable: str,
-    terms: tuple[Term, Term],
-    paths: tuple[Path, Path],
-    rules: tuple[tuple[int, ...], tuple[int, ...]],
-    ends: tuple[Fraction, Fraction],
-) -> Draft:
-    """Return that a curve has changed, with how far the two are apart on the domain."""
-    text = f"the curve of {terms[0].name!r} of {variable!r} has changed"
-    measures: tuple[Measure, ...] = ()
-    if ends[0] <= ends[1]:
-        distance = curve_distance(terms[0].shape, terms[1].shape, *ends)
-        most, at = outwards(distance.high)[1], float(distance.at)
-        exact = str(distance.low) if distance.low == distance.high else None
-        near = f", by {most:.3g} at most, near {at:.6g}"
-        text += near if distance.high else " outside the domain"
-        measures = (
-            Measure("largest difference", most, exact),
-            Measure("at least", outwards(distance.low)[0], str(distance.low)),
-            Measure("place of the largest difference", at, str(distance.at)),
-        )
-    draft = Draft("term", text, "rules", *paths, *rules, measures)
-    return draft._replace(is_harmless=not any(rules))
-
-
-def set_drafts(old: FuzzyTree, new: FuzzyTree, curves: Curves) -> Iterator[Draft]:
-    """Yield which fitted sets of trees differ: only raw rules use them."""
-    mine, theirs = (
-        {
-            (group.variable, term.name): term.shape
-            for group in tree.sets
-            for term in group.terms
-        }
-        for tree in (old, new)
-    )
-    both = [key for key in mine if key in theirs]
-    counts = {
-        "changed": sum(
-            curves.number(mine[key]) != curves.number(theirs[key]) for key in both
-        ),
-        "removed": len(mine) - len(both),
-        "new": len(theirs) - len(both),
-    }
-    changes = [f"{count} {what}" for what, count in counts.items() if count]
-    if changes:
-        text = f"of the fitted sets {', '.join(changes)}; only raw rules use them"
-        yield Draft("term", text, "never", ("sets",), ("sets",))
+def _text(value: object) -> str:
+    if isinstance(value, msgspec.Struct):
+        return " ".join(str(getattr(value, name)) for name in value.__struct_fields__)
+    return "none" if value is None else repr(value)

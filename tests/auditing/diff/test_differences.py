@@ -23,8 +23,8 @@ from fuzzytree.auditing.decide.states import (
     Witness,
     point_of,
 )
-from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference
+from fuzzytree.auditing.diff.records import Difference
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows
@@ -413,12 +413,13 @@ def test_systems_are_compared_by_their_numbers() -> None:
     fewer = replace(one, blocks=(replace(block, rules=block.rules[1:]),))
     found = results(one, fewer)
     assert (found.verdict, found.ok) == ("changed", False)
-    assert ("breaking", "rule 1 was removed") in sentences(found)
+    text = "rule 1 was removed: ALWAYS score hold is absent and score drop is absent"
+    assert ("breaking", text) in sentences(found)
     moved = replace(one.variables[0], unit="kN", high=9.0)
     found = results(one, replace(one, variables=(moved, *one.variables[1:])))
     assert (found.verdict, found.ok) == ("equal", True)
     assert sentences(found) == [
-        ("non-breaking", "the high of 'force' is 9.0, and was 5.0"),
+        ("non-breaking", "the range of 'force' is 0.0 to 9.0, and was 0.0 to 5.0"),
         ("cosmetic", "the unit of 'force' is 'kN', and was 'N'"),
     ]
 

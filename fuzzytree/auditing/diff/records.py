@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Final, Literal, NamedTuple, TypeVar
+from typing import Final, Literal, NamedTuple
 
 import msgspec
 
@@ -22,7 +21,7 @@ from fuzzytree.auditing.findings.records import (
     Measure,
     SourceFile,
 )
-from fuzzytree.model import Document, Path, Value
+from fuzzytree.model import Value
 
 FORMAT: Final = "fuzzytree-diff/1"
 
@@ -115,14 +114,15 @@ class Difference(Value, frozen=True):
     @property
     def verdict(self) -> Verdict:
         """Whether decisions are shown to be equal, known to change, or neither."""
-        if any(one.is_finding for one in self.answers):
+        if any(answer.is_finding for answer in self.answers):
             return "changed"
         equal = any(
-            isinstance(one.state, Proved | Computed) and one.subject == "decisions"
-            for one in self.answers
+            isinstance(answer.state, Proved | Computed)
+            for answer in self.answers
+            if answer.subject == "decisions"
         )
-        unsure = any(isinstance(one.state, Bracket | Declined) for one in self.answers)
-        return "equal" if equal and not unsure else "open"
+        is_open = any(isinstance(a.state, Bracket | Declined) for a in self.answers)
+        return "equal" if equal and not is_open else "open"
 
     @property
     def ok(self) -> bool:
@@ -130,7 +130,7 @@ class Difference(Value, frozen=True):
 
         What is not proved equal is `ok` too; see `verdict`.
         """
-        breaks = any(one.grade == "breaking" for one in self.changes)
+        breaks = any(change.grade == "breaking" for change in self.changes)
         return self.verdict != "changed" and not breaks
 
     @property
@@ -144,65 +144,15 @@ class Difference(Value, frozen=True):
         return msgspec.json.format(msgspec.json.encode(facts), indent=2).decode()
 
 
-Shown = Literal["always", "never", "rules", "ties", "uncovered", "any"]
-"""By which differing decision a change is shown to break something: by any; by one
-that a rule concerned makes, or a tie, or that no rule makes; always, or never."""
-
-
-class Draft(NamedTuple):
-    """A change that is not graded yet.
-
-    Attributes:
-        part: As in `Change`.
-        sentence: The change.
-        shown: What would show that it breaks something.
-        old: Where the old model holds it.
-        new: Where the new model holds it.
-        old_rules: The old rules concerned.
-        new_rules: The new rules concerned.
-        measures: Numbers that belong to it.
-        is_harmless: Whether it is for people only.
-    """
-
-    part: str
-    sentence: str
-    shown: Shown
-    old: Path | None = None
-    new: Path | None = None
-    old_rules: tuple[int, ...] = ()
-    new_rules: tuple[int, ...] = ()
-    measures: tuple[Measure, ...] = ()
-    is_harmless: bool = False
-
-
-_Key = TypeVar("_Key")
-_Part = TypeVar("_Part")
-
-
-def together(
-    old: Mapping[_Key, _Part], new: Mapping[_Key, _Part]
-) -> Iterator[tuple[_Key, _Part | None, _Part | None]]:
-    """Yield old parts, each with the new one of its key, then the new ones alone."""
-    for key in dict.fromkeys((*old, *new)):
-        yield key, old.get(key), new.get(key)
-
-
-def renamed_model(old: Document, new: Document) -> Iterator[Draft]:
-    """Yield that a model has another name, if it has."""
-    if old.name != new.name:
-        text, path = f"the model {old.name!r} is called {new.name!r}", ("name",)
-        yield Draft("name", text, "never", path, path, is_harmless=True)
-
-
-class DecisionEvidence(NamedTuple):
-    """How decisions that differ come about.
+class Evidence(NamedTuple):
+    """How decisions or numbers that differ come about.
 
     Attributes:
         old_rules: The old rules that win there.
         new_rules: The new rules that win there.
         has_tie: Whether two rules are equally strong in one of them.
         has_none: Whether no rule fires in one of them.
-        is_equal: Whether decisions are proved equal.
+        is_equal: Whether decisions, or numbers, are proved equal.
         has_number: Whether a number of two systems differs.
     """
 
@@ -214,33 +164,7 @@ class DecisionEvidence(NamedTuple):
     has_number: bool = False
 
     @property
-    def is_any(self) -> bool:
+    def has_any(self) -> bool:
         """Whether some decision, or some number, differs."""
-        return bool(
-            self.old_rules or self.new_rules or self.has_none or self.has_number
-        )
-
-
-def grade(draft: Draft, evidence: DecisionEvidence) -> Change:
-    """Return a change with its grade, and whether that is certain."""
-    is_broken = {
-        "always": True,
-        "never": False,
-        "any": evidence.is_any,
-        "ties": evidence.has_tie,
-        "uncovered": evidence.has_none,
-        "rules": not evidence.old_rules.isdisjoint(draft.old_rules)
-        or not evidence.new_rules.isdisjoint(draft.new_rules),
-    }[draft.shown]
-    grade: Grade = "breaking" if is_broken else "non-breaking"
-    if draft.is_harmless:
-        grade = "cosmetic"
-    return Change(
-        grade,
-        is_broken or draft.is_harmless or draft.shown == "never" or evidence.is_equal,
-        draft.part,
-        draft.sentence,
-        draft.old_rules,
-        draft.new_rules,
-        draft.measures,
-    )
+        rules = self.old_rules or self.new_rules
+        return bool(rules or self.has_none or self.has_number)

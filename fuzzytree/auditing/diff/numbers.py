@@ -1,0 +1,309 @@
+"""How the numbers of two fuzzy systems differ: proved alike, shown, or bounded.
+
+Outputs that are computed by the same operations, or are the same function of real
+numbers, are proved alike. The others are compared on rows of data, on probes of both
+systems and on points drawn from the domain; the point where one differs most is
+reported with all digits, in fractions where the systems allow it, and a bound says how
+far the two can be apart at most.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.decide import Budget, OutOfStepsError
+from fuzzytree.auditing.decide.domain import simplified
+from fuzzytree.auditing.decide.states import (
+    Bracket,
+    Declined,
+    Proved,
+    Witness,
+    coordinates,
+)
+from fuzzytree.auditing.diff.bounds import most
+from fuzzytree.auditing.diff.keys import Curves, SystemKeys
+from fuzzytree.auditing.diff.records import Evidence
+from fuzzytree.auditing.diff.samples import Differences, Pair, Progress, left_out
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    AuditSettings,
+    FactValue,
+    Measure,
+)
+from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.findings.support import sampled_share
+from fuzzytree.model import FloatArray, FuzzySystem
+from fuzzytree.numerics import outwards
+from fuzzytree.runtimes import run_system
+from fuzzytree.semantics import system_probes
+
+_PROBES = 2_000  # of each system
+_DRAWN = 4_000  # at most, for numbers take longer than decisions
+_STEPS = 10  # of a rule in a row
+_ROUNDING = 1e-9  # relative; what one function of real numbers may differ by
+_MOST_SHOWN = 0.9  # of the largest difference, at a witness of fewer digits
+_HOW = "as the reference computes it"
+_SPENT = "the budget was spent"
+
+
+class _Alike(NamedTuple):
+    """How an output is known to be alike, and where."""
+
+    how: str
+    where: str
+
+
+_SAME = _Alike("both perform the same operations on the same numbers", "")
+_WITHIN = _Alike(_SAME.how, " everywhere on the domain")
+_ROUNDED = _Alike(
+    "both are one function of real numbers: equal curves in equal rules",
+    " everywhere on the domain, but for rounding",
+)
+
+
+def number_answers(
+    pair: Pair[FuzzySystem],
+    rows: AuditRows | None,
+    settings: AuditSettings,
+    budget: Budget,
+    report: Progress,
+) -> tuple[list[AuditAnswer], Evidence]:
+    """Return what is known of the numbers that two systems have in common."""
+    answers = [*_answers(pair, rows, settings, budget, report)]
+    is_equal = any(answer.subject == "decisions" for answer in answers)  # proved
+    has_number = any(answer.is_finding for answer in answers)
+    return answers, Evidence(is_equal=is_equal, has_number=has_number)
+
+
+def _answers(
+    pair: Pair[FuzzySystem],
+    rows: AuditRows | None,
+    settings: AuditSettings,
+    budget: Budget,
+    report: Progress,
+) -> Iterator[AuditAnswer]:
+    steps = _STEPS * (len(pair.old.rules) + len(pair.new.rules))
+    try:
+        budget.spend(steps)
+    except OutOfStepsError:
+        yield left_out("numbers", "the numbers of the two", _SPENT)
+        return
+    proofs = _proofs(pair)
+    left = [name for name, proof in proofs.items() if proof is not _SAME]
+    if not left:
+        if proofs:
+            yield _all_alike(pair, _SAME)
+        return
+    differences = _Numbers(pair, left, steps)
+    differences.is_rounded = np.array([proofs[name] is _ROUNDED for name in left])
+    answers = [*_sampled(differences, rows, settings, budget, report)]
+    if differences.largest:
+        yield from (
+            differences.witness(name) for name in left if name in differences.largest
+        )
+    elif None not in proofs.values():
+        is_rounded = _ROUNDED in proofs.values()
+        whole = _all_alike(pair, _ROUNDED if is_rounded else _WITHIN)
+        if is_rounded:
+            size = Measure("largest difference by rounding", differences.rounding)
+            whole = msgspec.structs.replace(whole, measures=(size,))
+        yield whole
+        yield from answers
+        return
+    yield from answers
+    for name, proof in proofs.items():
+        if proof is not None and name not in differences.largest:
+            facts, state = {"where": proof.where}, Proved(proof.how)
+            yield audit_answer("FT801.output-alike", name, state, facts=facts)
+    for name, proof in proofs.items():
+        if proof is None:
+            yield differences.bound(name)
+
+
+def _proofs(pair: Pair[FuzzySystem]) -> dict[str, _Alike | None]:
+    """Return how each output of both is known to be alike; None if it is not."""
+    both, curves, domain = (pair.old, pair.new), Curves(), pair.domain
+    kinds = (
+        (_SAME, [SystemKeys(system) for system in both]),
+        (_WITHIN, [SystemKeys(system, domain) for system in both]),
+        (_ROUNDED, [SystemKeys(system, domain, curves) for system in both]),
+    )
+    result: dict[str, _Alike | None] = {}
+    for name in kinds[0][1][0].outputs:
+        if name in kinds[0][1][1].outputs:
+            result[name] = None
+            for proof, systems in reversed(kinds):
+                old, new = (keys.output(name) for keys in systems)
+                if old is not None and old == new:
+                    result[name] = proof
+    return result
+
+
+def _all_alike(pair: Pair[FuzzySystem], proof: _Alike) -> AuditAnswer:
+    where = proof.where
+    if {*pair.old.inputs} != {*pair.new.inputs}:
+        where += ", where no value is missing"
+    facts, state = {"where": where}, Proved(proof.how)
+    return audit_answer("FT801.numbers-alike", "decisions", state, facts=facts)
+
+
+def _sampled(
+    differences: _Numbers,
+    rows: AuditRows | None,
+    settings: AuditSettings,
+    budget: Budget,
+    report: Progress,
+) -> Iterator[AuditAnswer]:
+    """Yield how often outputs differ, and what the budget left out."""
+    pair, seed = differences.pair, settings.seed
+    samples: list[tuple[str, FloatArray, str]] = []
+    if rows is not None:
+        samples.append(("rows", rows.values, f"rows of {rows.name}"))
+    probes = pair.within(_probes(system) for system in (pair.old, pair.new))
+    samples.append(("probes", probes, "probes of both systems within the domain"))
+    points = pair.drawn(min(settings.rows, _DRAWN), seed)
+    samples.append(
+        ("domain", points, f"points drawn evenly from the domain, seed {seed}")
+    )
+    for place, (subject, values, how) in enumerate(samples):
+        report("comparing numbers", place / len(samples))
+        share = budget.share(1.0 / (len(samples) - place))
+        hits, count = differences.add(values, share)
+        if not count:
+            continue
+        of = "rows in which an output differs"
+        state = sampled_share(of, hits, count, f"{count} {how}")
+        facts: dict[str, FactValue] = {"from": how}
+        if not hits and differences.rounding:
+            facts["rounding"] = differences.rounding
+        yield audit_answer(
+            "FT801.outputs", subject, state, is_finding=hits > 0, facts=facts
+        )
+    if differences.left:
+        yield left_out("points", f"{differences.left} points", _SPENT)
+
+
+def _probes(system: FuzzySystem) -> FloatArray:
+    rows = system_probes(system, limit=_PROBES)
+    table = [[row[name] for row in rows] for name in system.inputs]
+    return np.array(table, np.float64).reshape(len(system.inputs), len(rows))
+
+
+class _Largest(NamedTuple):
+    """Where an output was seen to differ most."""
+
+    gap: float
+    was: float
+    now: float
+    point: Mapping[str, float]
+
+
+class _Numbers(Differences):
+    """Where outputs were seen to differ.
+
+    Attributes:
+        largest: The largest difference of each.
+        rounding: The largest difference of those that are one function.
+        is_rounded: Which outputs are.
+    """
+
+    def __init__(
+        self, pair: Pair[FuzzySystem], outputs: Sequence[str], steps: int
+    ) -> None:
+        super().__init__(steps)
+        self.pair, self.outputs = pair, outputs
+        self.is_rounded = np.zeros(len(outputs), np.bool_)
+        self.systems = (pair.old, pair.new)
+        self.runs = [run_system(system) for system in self.systems]
+        self.largest: dict[str, _Largest] = {}
+        self.rounding = 0.0
+
+    def compare(self, values: FloatArray, name: str, start: int) -> int:
+        """Return on how many rows an output differs; keep where it does most."""
+        old, new = self._numbers(values)
+        gap = _gap(old, new)
+        size = np.fmax(np.fmax(np.abs(old), np.abs(new)), 1.0)
+        is_small = self.is_rounded[:, None] & (gap <= _ROUNDING * size)
+        self.rounding = max(self.rounding, float(gap[is_small].max(initial=0.0)))
+        gap[is_small] = 0.0
+        points = np.where(np.isfinite(values).all(axis=0), gap, 0.0)
+        for place, row in enumerate(points.argmax(axis=1).tolist()):
+            output, most_here = self.outputs[place], float(points[place, row])
+            kept = self.largest.get(output)
+            if most_here and (kept is None or most_here > kept.gap):
+                point = zip(self.pair.inputs, values[:, row].tolist(), strict=True)
+                was, now = float(old[place, row]), float(new[place, row])
+                self.largest[output] = _Largest(most_here, was, now, dict(point))
+        return int((gap > 0.0).any(axis=0).sum())
+
+    def _numbers(self, values: FloatArray) -> list[FloatArray]:
+        """Return what both compute, each of shape (outputs, rows)."""
+        numbers: list[FloatArray] = []
+        for system, run in zip(self.systems, self.runs, strict=True):
+            names = [output.name for output in system.outputs]
+            outputs = run(self.pair.rows_of(system, values)).outputs
+            numbers.append(outputs[[names.index(name) for name in self.outputs]])
+        return numbers
+
+    def witness(self, name: str) -> AuditAnswer:
+        """Return where an output differs most, of what was seen."""
+        largest = self.largest[name]
+        place, inputs = self.outputs.index(name), self.pair.inputs
+
+        def numbers(point: Mapping[str, Fraction]) -> tuple[float, float, float]:
+            values = np.array([[float(point[key])] for key in inputs])
+            was, now = (table[place] for table in self._numbers(values))
+            return float(_gap(was, now)[0]), float(was[0]), float(now[0])
+
+        def is_large(point: Mapping[str, Fraction]) -> bool:
+            return numbers(point)[0] >= largest.gap * _MOST_SHOWN
+
+        row = {key: Fraction(value) for key, value in largest.point.items()}
+        point = simplified(row, self.pair.domain, is_large)
+        gap, was, now = numbers(point)
+        facts = {"now": _text(now), "was": _text(was), "how": _HOW}
+        measure = Measure("largest difference", gap)
+        state = Witness(coordinates(point), ())
+        return audit_answer(
+            "FT801.output-differs", name, state, measures=(measure,), facts=facts
+        )
+
+    def bound(self, name: str) -> AuditAnswer:
+        """Return between which numbers the largest difference of an output lies."""
+        of = f"the largest difference of {name!r} where both answer a number"
+        bound = most(*self.systems, name, self.pair.domain)
+        title = f"bound of {name}"
+        if bound is None:
+            state = Declined("FTD02", "nothing bounds what its rules conclude")
+            return audit_answer("FT801.no-bound", title, state, facts={"output": name})
+        low, high, largest = 0.0, outwards(bound[0])[1], self.largest.get(name)
+        if largest is not None and math.isfinite(largest.gap):
+            is_within = all(
+                side.low <= largest.point[side.variable] <= side.high
+                for side in self.pair.domain.sides
+                if side.variable in largest.point
+            )
+            low = min(largest.gap, high) if is_within else 0.0
+        facts: dict[str, FactValue] = {"output": name, "most": high}
+        bracket = Bracket(of, low, high, bound[1])
+        return audit_answer("FT801.bound", title, bracket, facts=facts)
+
+
+def _gap(old: FloatArray, new: FloatArray) -> FloatArray:
+    """Return how far numbers are apart: infinitely, if one alone is none."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        gap = np.abs(old - new)
+    gap[(old == new) | (np.isnan(old) & np.isnan(new))] = 0.0
+    gap[np.isnan(gap)] = np.inf
+    return gap
+
+
+def _text(number: float) -> str:
+    return "no number" if math.isnan(number) else repr(number)
