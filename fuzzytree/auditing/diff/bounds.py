@@ -11,7 +11,7 @@ from fractions import Fraction
 from operator import itemgetter
 
 from fuzzytree.auditing.decide.domain import Domain
-from fuzzytree.auditing.diff.keys import Entry, SystemKeys, facts_of
+from fuzzytree.auditing.diff.keys import Entry, Keys, facts_of
 from fuzzytree.model import (
     Formula,
     FuzzySystem,
@@ -69,7 +69,7 @@ class _Numbers:
     """An output of a system on a domain, and what its rules conclude of it."""
 
     def __init__(self, system: FuzzySystem, output: str, domain: Domain) -> None:
-        keys = SystemKeys(system, domain)
+        keys = Keys(system, domain)
         self.system, self.domain = system, domain
         self.output = keys.outputs[output]
         self.entries: Sequence[Entry] = [*keys.entries(output)]

@@ -25,6 +25,7 @@ from fuzzytree.model import (
     Or,
     Points,
     Proposition,
+    RuleBase,
     RuleBlock,
     SystemOutput,
     SystemRule,
@@ -91,11 +92,11 @@ class Entry(NamedTuple):
     most: float
 
 
-class SystemKeys:
-    """A system, and how its parts become keys.
+class Keys:
+    """A model, and how its parts become keys.
 
     Args:
-        system: The system.
+        model: The system; of a rule base conditions have keys.
         domain: Where it is used: a range that contains it changes no value.
         curves: Numbers for curves; then operands whose order does not matter are
             sorted.
@@ -103,25 +104,27 @@ class SystemKeys:
 
     def __init__(
         self,
-        system: FuzzySystem,
+        model: FuzzySystem | RuleBase,
         domain: Domain | None = None,
         curves: Curves | None = None,
     ) -> None:
-        self.system, self.domain, self.curves = system, domain, curves
-        self.outputs = {output.name: output for output in system.outputs}
-        self.terms = {
-            (variable.name, term.name): term
-            for variable in system.all_variables
-            for term in variable.terms
-        }
+        self.inputs, self.domain, self.curves = model.inputs, domain, curves
+        self.system = model if isinstance(model, FuzzySystem) else None
+        outputs = self.system.outputs if self.system else ()
+        self.blocks = self.system.blocks if self.system else ()
+        self.outputs = {output.name: output for output in outputs}
+        variables: list[Variable | SystemOutput] = [*model.variables, *outputs]
+        self.terms = {(v.name, term.name): term for v in variables for term in v.terms}
         self.sources: dict[str, Hashable] = {}
-        for variable in system.variables:
+        for variable in model.variables:
             self.sources[variable.name] = self._source(variable)
         functions = [term.function for term in self.terms.values()]
         formulas = [f.expression for f in functions if isinstance(f, Formula)]
         names = {name for formula in formulas for name in names_in(formula)}
-        names |= {q.variable for rule in system.rules for q in questions(rule.when)}
+        rules = [rule for block in self.blocks for rule in block.rules]
+        names |= {part.variable for rule in rules for part in questions(rule.when)}
         self.is_chained = not names.isdisjoint(self.outputs)
+        self.joined = joined_outputs(self.system) if self.system else frozenset()
 
     def _source(self, variable: Variable) -> Hashable:
         """Return what the value of a variable is computed from."""
@@ -141,7 +144,7 @@ class SystemKeys:
     @property
     def is_smooth(self) -> bool:
         """Whether rounding changes numbers by little, as far as rules go."""
-        blocks = self.system.blocks
+        blocks = self.blocks
         norms = {norm for b in blocks for norm in (b.conjunction, b.disjunction)}
         norms |= {block.implication for block in blocks}
         ways = {block.activation.method for block in blocks}
@@ -159,10 +162,10 @@ class SystemKeys:
             return None
         if not self.is_chained:
             return self._output(output)
-        every = tuple(map(self._output, self.system.outputs))
+        every = tuple(map(self._output, self.outputs.values()))
         rules = tuple(
             tuple((self._rule(rule, block), rule.then) for rule in block.rules)
-            for block in self.system.blocks
+            for block in self.blocks
         )
         return name, every, rules
 
@@ -173,7 +176,7 @@ class SystemKeys:
         ]
         joins, is_weighted = output.aggregation, output.defuzzifier.is_weighted
         is_free = self.curves is not None
-        if is_free and is_weighted and output.name not in joined_outputs(self.system):
+        if is_free and is_weighted and output.name not in self.joined:
             joins = None
         is_free = is_free and joins != "normalized sum"
         if is_free and not self.is_chained:
@@ -186,7 +189,7 @@ class SystemKeys:
     def entries(self, output: str) -> Iterator[Entry]:
         """Yield the conclusions of an output; hedges act on those behind them too."""
         is_curve = not self.outputs[output].defuzzifier.is_weighted
-        for block in self.system.blocks:
+        for block in self.blocks:
             how = block.activation
             rules = [rule for rule in block.rules if rule.weight]
             keys = tuple(self._rule(rule, block) for rule in rules)
@@ -226,26 +229,26 @@ class SystemKeys:
             names = dict.fromkeys(names_in(curve.expression))
             return curve, term.height, *(self.sources.get(name) for name in names)
         if isinstance(curve, Linear):
-            pairs = zip(self.system.inputs, curve.weights, strict=True)
+            pairs = zip(self.inputs, curve.weights, strict=True)
             columns = tuple((n, w, self.sources[n]) for n, w in pairs if w)
             return curve.offset, term.height, *columns
         if self.curves and not is_number:
             return self.curves.key(term)
         return curve if is_number else shape_of(curve) or curve, term.height
 
+    def _term(self, variable: str, name: str) -> Hashable:
+        """Return a term of an input, or of an output that a rule uses."""
+        term = self.terms[variable, name]
+        if variable in self.outputs:
+            return self._conclusion(self.outputs[variable], term)
+        return self._curve(term)
+
     def condition(self, when: Condition, block: RuleBlock) -> Hashable:
         """Return the key of a condition."""
         match when:
-            case Proposition(variable=variable, term=name, hedges=hedges):
-                if name is None:
-                    return "is", None, hedges
-                term = self.terms[variable, name]
-                key: Hashable
-                if variable in self.outputs:
-                    key = variable, self._conclusion(self.outputs[variable], term)
-                else:
-                    key = self.sources[variable], self._curve(term)
-                return "is", key, hedges
+            case Proposition(variable=variable, terms=terms, hedges=hedges):
+                each = [self._term(variable, name) for name in terms]
+                return self.sources.get(variable, variable), hedges, frozenset(each)
             case Not(part=part):
                 return "not", self.condition(part, block)
             case And(parts=parts):

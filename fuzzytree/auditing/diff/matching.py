@@ -9,11 +9,11 @@ propositions in common.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple, TypeVar
 
-from fuzzytree.auditing.diff.keys import Curves, SystemKeys
+from fuzzytree.auditing.diff.keys import Curves, Keys
 from fuzzytree.formats import conclusions_text, condition_sentence, condition_texts
 from fuzzytree.model import (
     And,
@@ -22,7 +22,7 @@ from fuzzytree.model import (
     Path,
     Proposition,
     RuleBase,
-    proposition_text,
+    RuleBlock,
     questions,
     sentence,
 )
@@ -82,7 +82,7 @@ class MatchRule(NamedTuple):
     operands: tuple[Operand, ...]
     label: str  # what it concludes
     then: str  # the same, as the other model calls it
-    terms: frozenset[tuple[str, str]]  # of variables, which it names
+    terms: set[tuple[str, str]]  # of variables, which it names
     weight: float = 1.0
     block: int | None = None  # of a system
 
@@ -128,59 +128,46 @@ def rules_to_match(
     names: Mapping[str, str] = MappingProxyType({}),
 ) -> list[MatchRule]:
     """Return the rules of a model; `names`: what the other one calls its classes."""
-    if isinstance(model, FuzzySystem):
-        return [*_system_rules(model, curves)]
-    axes = {v.name: v.parts or v.name for v in model.variables}
-    numbers = {
-        (v.name, t.name): curves.key(t) for v in model.variables for t in v.terms
-    }
+    keys = Keys(model, curves=curves)
 
-    def operand(part: Proposition) -> Operand:
-        name, terms = part.variable, part.terms
-        key = axes[name], part.negated, frozenset(numbers[name, t] for t in terms)
-        words = name, part.negated, frozenset(terms)
-        return Operand(key, words, proposition_text(part), name)
+    def operand(part: Condition, block: RuleBlock) -> Operand:
+        key, text = keys.condition(part, block), condition_sentence(part)
+        if not isinstance(part, Proposition):
+            return Operand(key, text, text, text)
+        words = part.variable, part.hedges, frozenset(part.terms)
+        return Operand(key, words, text, part.variable)
 
-    return [
-        MatchRule(
-            ("rules", place),
-            sentence(rule),
-            tuple(map(operand, rule.when)),
-            rule.then,
-            names.get(rule.then, rule.then),
-            frozenset((part.variable, t) for part in rule.when for t in part.terms),
-        )
-        for place, rule in enumerate(model.rules)
-    ]
+    def terms(parts: Iterable[Proposition]) -> set[tuple[str, str]]:
+        return {(part.variable, term) for part in parts for term in part.terms}
 
-
-def _system_rules(system: FuzzySystem, curves: Curves) -> Iterator[MatchRule]:
-    keys = SystemKeys(system, curves=curves)
-    for number, block in enumerate(system.blocks):
+    if isinstance(model, RuleBase):
+        block = RuleBlock(())
+        return [
+            MatchRule(
+                ("rules", place),
+                sentence(rule),
+                tuple(operand(part, block) for part in rule.when),
+                rule.then,
+                names.get(rule.then, rule.then),
+                terms(rule.when),
+            )
+            for place, rule in enumerate(model.rules)
+        ]
+    rules: list[MatchRule] = []
+    for number, block in enumerate(model.blocks):
         for place, rule in enumerate(block.rules):
-            parts: tuple[Condition, ...] = (rule.when,) if rule.when else ()
-            if isinstance(rule.when, And):
-                parts = rule.when.parts
-            operands: list[Operand] = []
-            for part in parts:
-                text, key = condition_sentence(part), keys.condition(part, block)
-                name = part.variable if isinstance(part, Proposition) else text
-                operands.append(Operand(key, text, text, name))
+            parts = rule.when.parts if isinstance(rule.when, And) else (rule.when,)
             then = conclusions_text(rule.then)
             when = " and ".join(condition_texts(rule.when))
             text = f"IF {when} THEN {then}" if when else f"ALWAYS {then}"
-            terms = {(p.variable, t) for p in questions(rule.when) for t in p.terms}
-            terms |= {(each.output, each.term) for each in rule.then}
-            yield MatchRule(
-                ("blocks", number, "rules", place),
-                text,
-                tuple(operands),
-                then,
-                then,
-                frozenset(terms),
-                rule.weight,
-                number,
+            concluded = {(part.output, part.term) for part in rule.then}
+            operands = tuple(operand(part, block) for part in parts if part)
+            users = terms(questions(rule.when)) | concluded
+            path: Path = ("blocks", number, "rules", place)
+            rules.append(
+                MatchRule(path, text, operands, then, then, users, rule.weight, number)
             )
+    return rules
 
 
 SAME, CONCLUSION, CURVES, PROPOSITIONS = range(4)

@@ -27,7 +27,7 @@ from fuzzytree.auditing.decide.states import (
     coordinates,
 )
 from fuzzytree.auditing.diff.bounds import most
-from fuzzytree.auditing.diff.keys import Curves, SystemKeys
+from fuzzytree.auditing.diff.keys import Curves, Keys
 from fuzzytree.auditing.diff.records import Evidence
 from fuzzytree.auditing.diff.samples import Differences, Pair, Progress, left_out
 from fuzzytree.auditing.findings.codes import audit_answer
@@ -131,9 +131,9 @@ def _proofs(pair: Pair[FuzzySystem]) -> dict[str, _Alike | None]:
     """Return how each output of both is known to be alike; None if it is not."""
     both, curves, domain = (pair.old, pair.new), Curves(), pair.domain
     kinds = (
-        (_SAME, [SystemKeys(system) for system in both]),
-        (_WITHIN, [SystemKeys(system, domain) for system in both]),
-        (_ROUNDED, [SystemKeys(system, domain, curves) for system in both]),
+        (_SAME, [Keys(system) for system in both]),
+        (_WITHIN, [Keys(system, domain) for system in both]),
+        (_ROUNDED, [Keys(system, domain, curves) for system in both]),
     )
     result: dict[str, _Alike | None] = {}
     for name in kinds[0][1][0].outputs:
@@ -272,7 +272,7 @@ class _Numbers(Differences):
         measure = Measure("largest difference", gap)
         state = Witness(coordinates(point), ())
         return audit_answer(
-            "FT801.output-differs", name, state, measures=(measure,), facts=facts
+            "FT801.output-differs", name, state, measure, facts=facts
         )
 
     def bound(self, name: str) -> AuditAnswer:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 
-from fuzzytree.auditing.decide import Literal
 from fuzzytree.auditing.decide.answers import ZERO
+from fuzzytree.auditing.decide.axes import Axis
+from fuzzytree.auditing.decide.boxes import Factor
 from fuzzytree.auditing.decide.lines import Lines, value_at
 from fuzzytree.auditing.decide.states import Span
 from fuzzytree.auditing.diff.agreement import Agreement, Side
@@ -29,75 +30,66 @@ def difference_region(
     Returns:
         Nothing where a rule uses a combination, or the point is not on the domain.
     """
-    is_free = all(axis.is_input for axis in both.base.used)
-    if not is_free or not both.base.contains(point):
+    used = both.base.used
+    if not (all(axis.is_input for axis in used) and both.base.contains(point)):
         return ()
-    return tuple(_Region(both, point).spans())
+    region = _Region(both, point)
+    return tuple(span for axis in used if (span := region.span(axis)) is not None)
 
 
 class _Region:
     """A box around a point, which grows as long as both models predict the same."""
 
     def __init__(self, both: Agreement, point: Mapping[str, Fraction]) -> None:
-        self.both, self.base, self.point = both, both.base, point
-        self.labels = tuple(one.label for one in both.predictions(point))
-        self.box: dict[str, Ends] = {}
-        for axis in self.base.used:
-            self.box[axis.name] = point[axis.name], point[axis.name]
-        self.degrees = {
-            key: self._range(*key, self.box[key[0]])
-            for rule in self.base.rules
-            for key in rule.literals
-        }
+        self.both, self.base = both, both.base
+        self.labels, self.point = both.labels(point), point
+        keys = {key for rule in self.base.rules for key in rule.literals}
+        self.degrees = {key: self._range(key, (point[key[0]],) * 2) for key in keys}
 
-    def spans(self) -> list[Span]:
-        """Return the ends of the axes that matter."""
-        result: list[Span] = []
-        for axis in self.base.used:
-            if self._grows(axis.name, (axis.least, axis.largest)):
-                continue
-            for beyond in (axis.least, axis.largest):
-                self._stretch(axis.name, beyond)
-            low, high = self.box[axis.name]
-            if axis.values:
-                inside = [x for x in axis.values if low <= x <= high]
-                low, high = inside[0], inside[-1]
-            elif axis.is_whole:
-                here = self.point[axis.name]
-                low = min(Fraction(math.ceil(low)), here)
-                high = max(Fraction(math.floor(high)), here)
-            result.append(Span(axis.name, float(low), float(high)))
-        return result
+    def span(self, axis: Axis) -> Span | None:
+        """Return how far the box reaches along an axis, None if all of it will do."""
+        low = high = here = self.point[axis.name]
+        if self._grows(axis, (axis.least, axis.largest)):
+            return None
+        low = self._stretch(axis, axis.least, lambda end: (end, high))
+        high = self._stretch(axis, axis.largest, lambda end: (low, end))
+        if axis.values:
+            inside = [x for x in axis.values if low <= x <= high]
+            low, high = inside[0], inside[-1]
+        elif axis.is_whole:
+            low = min(Fraction(math.ceil(low)), here)
+            high = max(Fraction(math.floor(high)), here)
+        return Span(axis.name, float(low), float(high))
 
-    def _stretch(self, name: str, beyond: Fraction) -> None:
-        def moved(end: Fraction) -> Ends:
-            low, high = self.box[name]
-            return min(low, end), max(high, end)
-
-        if self._grows(name, moved(beyond)):
-            return
-        best = self.box[name][beyond > self.box[name][0]]
+    def _stretch(
+        self, axis: Axis, beyond: Fraction, ends: Callable[[Fraction], Ends]
+    ) -> Fraction:
+        """Return how far one end may go, where the other one stays."""
+        best = self.point[axis.name]
+        if self._grows(axis, ends(beyond)):
+            return beyond
         for _ in range(_HALVINGS):
             near = Fraction(float((best + beyond) / 2))
             if near in (best, beyond):
                 break
-            if self._grows(name, moved(near)):
+            if self._grows(axis, ends(near)):
                 best = near
             else:
                 beyond = near
+        return best
 
-    def _grows(self, name: str, ends: Ends) -> bool:
+    def _grows(self, axis: Axis, ends: Ends) -> bool:
         """Make the box wider, if predictions are the same on all of it."""
-        kept = self.degrees
-        own = {key: self._range(*key, ends) for key in kept if key[0] == name}
-        self.degrees = {**kept, **own}
-        if all(self._is_sure(side) for side in (0, 1)):
-            self.box[name] = ends
+        before = self.degrees
+        keys = [key for key in before if key[0] == axis.name]
+        self.degrees = {**before, **{key: self._range(key, ends) for key in keys}}
+        if self._is_sure(0) and self._is_sure(1):
             return True
-        self.degrees = kept
+        self.degrees = before
         return False
 
     def _is_sure(self, side: Side) -> bool:
+        """Return whether a model predicts its class in all of the box."""
         label, lead, first = self.labels[side], ZERO, -1
         others: list[tuple[Fraction, int]] = []
         for k in self.both.groups[side]:
@@ -105,10 +97,10 @@ class _Region:
             low = high = rule.factor
             for key in rule.literals:
                 a, b = self.degrees[key]
-                if rule.norm == "product":
-                    low, high = low * a, high * b
-                else:
-                    low, high = min(low, a), min(high, b)
+                is_product = rule.norm == "product"
+                low, high = (
+                    (low * a, high * b) if is_product else (min(low, a), min(high, b))
+                )
             if rule.then != label:
                 others.append((high, k))
             elif low > lead:
@@ -118,27 +110,21 @@ class _Region:
             return is_none and not any(high for high, _ in others)
         return all(high < lead or (high == lead and k > first) for high, k in others)
 
-    def _range(self, name: str, degree: Literal, ends: Ends) -> Ends:
+    def _range(self, key: Factor, ends: Ends) -> Ends:
         """Return bounds of a degree between two values of an axis."""
-        pick = min if degree.negated else max
-        low, high = self.base.axes[name].parts[degree]
+        name, literal = key
+        pick = min if literal.negated else max
+        low, high = self.base.axes[name].parts[literal]
         return (
-            pick(min(_values(one, ends)) for one in low),
-            pick(max(_values(one, ends)) for one in high),
+            pick(min(_values(lines, *ends)) for lines in low),
+            pick(max(_values(lines, *ends)) for lines in high),
         )
 
 
-def _values(lines: Lines, ends: Ends) -> list[Fraction]:
+def _values(lines: Lines, low: Fraction, high: Fraction) -> list[Fraction]:
     """Return values and limits between two places, which the others lie between."""
-    low, high = ends
-    result = [value_at(lines, low), value_at(lines, high)]
-    last = len(lines.x) - 1
-    first, stop = bisect_left(lines.x, low), bisect_right(lines.x, high)
-    for k in range(first, stop):
-        x = lines.x[k]
-        result.append(lines.at[k])
-        if x > low and k:
-            result.append(lines.before[k - 1])
-        if x < high and k < last:
-            result.append(lines.after[k])
-    return result
+    start, stop = bisect_left(lines.x, low), bisect_right(lines.x, high)
+    above, below = bisect_right(lines.x, low), bisect_left(lines.x, high)
+    values = [value_at(lines, low), value_at(lines, high), *lines.at[start:stop]]
+    values += lines.before[max(above - 1, 0) : max(stop - 1, 0)]
+    return [*values, *lines.after[start:below]]

@@ -501,7 +501,7 @@ class Structure:
                     Measure("at least", outwards(distance.low)[0], str(distance.low)),
                     Measure("place of the largest difference", at, str(distance.at)),
                 )
-        is_unused = not (old.rules or new.rules)
+        is_unused = not (old.rules or new.rules) and isinstance(variable, Variable)
         self._report("term", text, "rules", old, new, measures, is_harmless=is_unused)
 
 

@@ -21,7 +21,7 @@ from fuzzytree.auditing.decide.states import (
 )
 from fuzzytree.auditing.diff.bounds import most
 from fuzzytree.auditing.diff.differences import difference, joined_domain
-from fuzzytree.auditing.diff.keys import Curves, SystemKeys
+from fuzzytree.auditing.diff.keys import Curves, Keys
 from fuzzytree.auditing.diff.records import Difference
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditSettings
@@ -32,18 +32,12 @@ from fuzzytree.model import (
     Condition,
     Defuzzifier,
     FuzzySystem,
-    Hedge,
-    Linear,
-    Not,
-    Or,
     Proposition,
     RuleBlock,
     Singleton,
-    SNorm,
     SystemOutput,
     SystemRule,
     Term,
-    TNorm,
     Trapezoid,
     Variable,
 )
@@ -143,7 +137,7 @@ def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
     other = replace(one, terms=(long, one.terms[1]))
     service = tipper().variables[1]
     old, new = (tipper(inputs=(each, service)) for each in (one, other))
-    assert SystemKeys(old).output("tip") != SystemKeys(new).output("tip")
+    assert Keys(old).output("tip") != Keys(new).output("tip")
     assert results(old, new).answers[0].state == Proved(
         "both are one function of real numbers: equal curves in equal rules"
     )
@@ -177,7 +171,7 @@ def test_where_order_decides_it_is_no_rounding() -> None:
     first = RuleBlock((ONE, TWO, THREE), activation=Activation("highest"))
     highest = replace(tipper(), blocks=(first,))
     turned = with_rules(highest, THREE, ONE, TWO)
-    assert SystemKeys(highest, curves=Curves()).output("tip") is None
+    assert Keys(highest, curves=Curves()).output("tip") is None
     assert results(highest, turned).verdict == "changed"
 
 
@@ -210,12 +204,6 @@ def test_a_constant_that_changed_has_a_witness_and_a_bound() -> None:
     assert bound.why == (
         "degrees are the same, and no number that rules conclude moves by more"
     )
-
-
-def test_a_constant_that_is_changed_back_is_no_difference() -> None:
-    changed = tipper(numbers={"high": 25.5})
-    assert results(tipper(), changed).verdict == "changed"
-    assert results(tipper(), tipper(numbers={"high": 25.0})).verdict == "equal"
 
 
 def test_a_curve_that_changed_is_bounded_by_the_numbers() -> None:
@@ -309,52 +297,6 @@ def test_a_hedge_lifts_a_degree_above_the_weight_of_its_rule() -> None:
 # --- no proof and no bound is wrong
 
 
-def made(chance: random.Random) -> FuzzySystem:
-    """Return a system whose numbers are fractions."""
-
-    def curve() -> Trapezoid:
-        return Trapezoid(*sorted(float(chance.randrange(9)) for _ in range(4)))
-
-    inputs = tuple(
-        Variable(name, tuple(Term(f"t{k}", curve()) for k in range(3)),
-                    low=0.0, high=8.0, clips=chance.random() < 0.2)
-        for name in "ab"
-    )  # fmt: skip
-    curves = [
-        Singleton(float(chance.randrange(9)))
-        if chance.random() < 0.6
-        else Linear((float(chance.randrange(-3, 4)), float(chance.randrange(3))), 1.0)
-        for _ in range(3)
-    ]
-    output = SystemOutput(
-        "tip",
-        tuple(Term(f"o{k}", curve) for k, curve in enumerate(curves)),
-        0.0,
-        30.0,
-        chance.choice([AVERAGE, AVERAGE, Defuzzifier("weighted sum")]),
-        default=chance.choice([None, 0.0]),
-        clips=chance.random() < 0.2,
-    )
-
-    def queries() -> Proposition:
-        hedges: tuple[Hedge, ...] = chance.choice([(), (), ("not",), ("very",)])
-        return Proposition(chance.choice("ab"), (f"t{chance.randrange(3)}",), hedges)
-
-    def condition() -> Condition:
-        kind = chance.randrange(4)
-        both = (queries(), queries())
-        return (queries(), And(both), Or(both), Not(And(both)))[kind]
-
-    rules = [
-        rule(condition(), f"o{chance.randrange(3)}", weight=chance.choice([1.0, 0.5]))
-        for _ in range(4)
-    ]
-    conjunction: TNorm = chance.choice(["minimum", "product"])
-    disjunction: SNorm = chance.choice(["maximum", "algebraic sum"])
-    block = RuleBlock(tuple(rules), conjunction, disjunction)
-    return FuzzySystem("made", inputs, (output,), (block,))
-
-
 def altered(system: FuzzySystem, chance: random.Random) -> FuzzySystem:
     """Return a system with its rules in another order, one changed, or one number."""
     block, output = system.blocks[0], system.outputs[0]
@@ -364,7 +306,7 @@ def altered(system: FuzzySystem, chance: random.Random) -> FuzzySystem:
         chance.shuffle(rules)
     elif kind == 1:
         rules[0] = replace(rules[0], weight=0.25)
-    elif kind == 2:
+    elif kind == 2 and output.defuzzifier.is_weighted:
         first = replace(output.terms[0], function=Singleton(3.5))
         moved = replace(output, terms=(first, *output.terms[1:]))
         return replace(system, outputs=(moved, *system.outputs[1:]))
@@ -378,17 +320,14 @@ def altered(system: FuzzySystem, chance: random.Random) -> FuzzySystem:
 
 def check_pair(seed: int, rows: int) -> None:
     chance = random.Random(seed)
-    old = made(chance) if seed % 2 else random_system(seed)
-    output = old.outputs[0]
-    if not (seed % 2 or output.defuzzifier.is_weighted):
-        return
+    old = random_system(seed)
     new = altered(old, chance)
-    name, curves = output.name, Curves()
+    name, curves = old.outputs[0].name, Curves()
     domain = domain_of(old)
     is_same, is_meant = (
         keys[0] is not None and keys[0] == keys[1]
         for keys in (
-            [SystemKeys(system, domain, own).output(name) for system in (old, new)]
+            [Keys(system, domain, own).output(name) for system in (old, new)]
             for own in (None, curves)
         )
     )
