@@ -271,9 +271,7 @@ class _Numbers(Differences):
         facts = {"now": _text(now), "was": _text(was), "how": _HOW}
         measure = Measure("largest difference", gap)
         state = Witness(coordinates(point), ())
-        return audit_answer(
-            "FT801.output-differs", name, state, measure, facts=facts
-        )
+        return audit_answer("FT801.output-differs", name, state, measure, facts=facts)
 
     def bound(self, name: str) -> AuditAnswer:
         """Return between which numbers the largest difference of an output lies."""

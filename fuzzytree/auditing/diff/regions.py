@@ -44,7 +44,8 @@ class _Region:
         self.both, self.base = both, both.base
         self.labels, self.point = both.labels(point), point
         keys = {key for rule in self.base.rules for key in rule.literals}
-        self.degrees = {key: self._range(key, (point[key[0]],) * 2) for key in keys}
+        at = {key: (point[key[0]], point[key[0]]) for key in keys}
+        self.degrees = {key: self._range(key, ends) for key, ends in at.items()}
 
     def span(self, axis: Axis) -> Span | None:
         """Return how far the box reaches along an axis, None if all of it will do."""
