@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from operator import itemgetter
 
+from fuzzytree.auditing.decide.answers import ZERO
 from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.diff.keys import Entry, Keys, facts_of
 from fuzzytree.model import (
@@ -20,6 +21,7 @@ from fuzzytree.model import (
     SystemOutput,
     Term,
     Variable,
+    sampled_values,
 )
 from fuzzytree.semantics import joined_outputs
 
@@ -100,8 +102,9 @@ class _Numbers:
             return None
         if self.output.defuzzifier.is_weighted:
             spans += [sum_ and _ends(*sum_, self.domain) for sum_ in self.sums()]
-        else:  # which has a range, or is refused
-            spans.append((Fraction(output.low or 0), Fraction(output.high or 0)))
+        else:  # singletons may lie beyond the range
+            xs = [output.low or 0.0, output.high or 0.0, *sampled_values(output)]
+            spans.append((Fraction(min(xs)), Fraction(max(xs))))
         if output.default is not None:
             spans.append((Fraction(output.default), Fraction(output.default)))
         ends = [end for span in spans if span for end in span]
@@ -136,30 +139,26 @@ def _apart(one: _Numbers, other: _Numbers) -> _Bound | None:
 
 def _moved(one: _Numbers, other: _Numbers) -> _Bound | None:
     """Return the bound where only numbers differ, and all degrees are the same."""
-    pairs = [*zip(one.entries, other.entries, strict=False)]
-    is_same = len(one.entries) == len(other.entries) and all(
-        (a.strength, a.term.height) == (b.strength, b.term.height) for a, b in pairs
+    degrees, others = (
+        [facts_of(of.output), *((e.strength, e.term.height) for e in of.entries)]
+        for of in (one, other)
     )
-    is_same &= facts_of(one.output) == facts_of(other.output)
-    is_small = not one.is_sum or (one.is_small and other.is_small)
-    is_joined = one.is_joined or other.is_joined
+    is_large = one.is_sum and not (one.is_small and other.is_small)
     is_weighted = one.output.defuzzifier.is_weighted
-    if not (is_same and is_small and is_weighted) or is_joined:
+    is_free = is_weighted and not (is_large or one.is_joined or other.is_joined)
+    if degrees != others or not is_free:
         return None
-    moves = [Fraction(0)]
+    moves = [ZERO]
     for entry, a, b in zip(one.entries, one.sums(), other.sums(), strict=True):
         if a is None or b is None:
             return None
-        names = {**a[0], **b[0]}
-        weights = {
-            n: a[0].get(n, Fraction(0)) - b[0].get(n, Fraction(0)) for n in names
-        }
+        weights = {n: a[0].get(n, ZERO) - b[0].get(n, ZERO) for n in {**a[0], **b[0]}}
         ends = _ends(weights, a[1] - b[1], one.domain)
         if ends is None:
             return None
         scale = Fraction(entry.most) if one.is_sum else 1
         moves.append(scale * max(abs(ends[0]), abs(ends[1])))
-    bound = sum(moves, Fraction(0)) if one.is_sum else max(moves)
+    bound = sum(moves, ZERO) if one.is_sum else max(moves)
     before, after = one.output.default, other.output.default
     if before != after:
         if before is None or after is None:

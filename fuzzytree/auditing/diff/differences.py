@@ -62,11 +62,7 @@ def joined_domain(
 ) -> Domain:
     """Return where two models are compared: what either of them declares.
 
-    Args:
-        old: A model.
-        new: Another one.
-        limits: The ends of inputs, which go before what is declared.
-        rows: Rows of the inputs of either, for inputs without range and curve.
+    `limits` go before what is declared; `rows` are for inputs without range and curve.
 
     Raises:
         ValueError: If an input has no limits, or if those given are none.
@@ -115,17 +111,6 @@ def difference(
     data: SourceFile | None = None,
 ) -> Difference:
     """Return what changed from one model to another.
-
-    Args:
-        old: A tree, a rule base or a fuzzy system.
-        new: Another one.
-        domain: A side for each input of either.
-        rows: Rows of the inputs of either, the old one's first.
-        settings: How many points are drawn, and their seed.
-        budget: How many steps may be taken.
-        report: Called with the current step, and the share of the work that is done.
-        files: Where the two were read from.
-        data: Where the rows were read from.
 
     Raises:
         ReadError: If one decides and the other gives numbers.

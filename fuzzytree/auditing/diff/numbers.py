@@ -9,12 +9,12 @@ far the two can be apart at most.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from fuzzytree.auditing.decide import Budget, OutOfStepsError
@@ -101,22 +101,20 @@ def _answers(
         if proofs:
             yield _all_alike(pair, _SAME)
         return
-    differences = _Numbers(pair, left, steps)
-    differences.is_rounded = np.array([proofs[name] is _ROUNDED for name in left])
+    is_rounded = [proofs[name] is _ROUNDED for name in left]
+    differences = _Numbers(pair, left, is_rounded, steps)
     answers = [*_sampled(differences, rows, settings, budget, report)]
-    if differences.largest:
-        yield from (
-            differences.witness(name) for name in left if name in differences.largest
-        )
-    elif None not in proofs.values():
-        is_rounded = _ROUNDED in proofs.values()
-        whole = _all_alike(pair, _ROUNDED if is_rounded else _WITHIN)
-        if is_rounded:
-            size = Measure("largest difference by rounding", differences.rounding)
-            whole = msgspec.structs.replace(whole, measures=(size,))
-        yield whole
+    if not differences.largest and None not in proofs.values():
+        size = Measure("largest difference by rounding", differences.rounding)
+        if any(is_rounded):
+            yield _all_alike(pair, _ROUNDED, size)
+        else:
+            yield _all_alike(pair, _WITHIN)
         yield from answers
         return
+    yield from (
+        differences.witness(name) for name in left if name in differences.largest
+    )
     yield from answers
     for name, proof in proofs.items():
         if proof is not None and name not in differences.largest:
@@ -135,23 +133,24 @@ def _proofs(pair: Pair[FuzzySystem]) -> dict[str, _Alike | None]:
         (_WITHIN, [Keys(system, domain) for system in both]),
         (_ROUNDED, [Keys(system, domain, curves) for system in both]),
     )
-    result: dict[str, _Alike | None] = {}
-    for name in kinds[0][1][0].outputs:
-        if name in kinds[0][1][1].outputs:
-            result[name] = None
-            for proof, systems in reversed(kinds):
-                old, new = (keys.output(name) for keys in systems)
-                if old is not None and old == new:
-                    result[name] = proof
+    names = [output.name for output in pair.new.outputs]
+    result: dict[str, _Alike | None]
+    result = {of.name: None for of in pair.old.outputs if of.name in names}
+    for (proof, (old, new)), name in itertools.product(reversed(kinds), result):
+        key = old.output(name)
+        if key is not None and key == new.output(name):
+            result[name] = proof
     return result
 
 
-def _all_alike(pair: Pair[FuzzySystem], proof: _Alike) -> AuditAnswer:
-    where = proof.where
-    if {*pair.old.inputs} != {*pair.new.inputs}:
-        where += ", where no value is missing"
-    facts, state = {"where": where}, Proved(proof.how)
-    return audit_answer("FT801.numbers-alike", "decisions", state, facts=facts)
+def _all_alike(
+    pair: Pair[FuzzySystem], proof: _Alike, *measures: Measure
+) -> AuditAnswer:
+    is_whole = {*pair.old.inputs} == {*pair.new.inputs}
+    where = proof.where + ("" if is_whole else ", where no value is missing")
+    key, subject = "FT801.numbers-alike", "decisions"
+    facts = {"where": where}
+    return audit_answer(key, subject, Proved(proof.how), *measures, facts=facts)
 
 
 def _sampled(
@@ -196,33 +195,27 @@ def _probes(system: FuzzySystem) -> FloatArray:
     return np.array(table, np.float64).reshape(len(system.inputs), len(rows))
 
 
-class _Largest(NamedTuple):
-    """Where an output was seen to differ most."""
-
-    gap: float
-    was: float
-    now: float
-    point: Mapping[str, float]
-
-
 class _Numbers(Differences):
     """Where outputs were seen to differ.
 
     Attributes:
-        largest: The largest difference of each.
+        largest: The largest difference of each, and its point.
         rounding: The largest difference of those that are one function.
-        is_rounded: Which outputs are.
     """
 
     def __init__(
-        self, pair: Pair[FuzzySystem], outputs: Sequence[str], steps: int
+        self,
+        pair: Pair[FuzzySystem],
+        outputs: Sequence[str],
+        is_rounded: Sequence[bool],
+        steps: int,
     ) -> None:
         super().__init__(steps)
         self.pair, self.outputs = pair, outputs
-        self.is_rounded = np.zeros(len(outputs), np.bool_)
+        self.is_rounded = np.array(is_rounded)
         self.systems = (pair.old, pair.new)
         self.runs = [run_system(system) for system in self.systems]
-        self.largest: dict[str, _Largest] = {}
+        self.largest: dict[str, tuple[float, dict[str, float]]] = {}
         self.rounding = 0.0
 
     def compare(self, values: FloatArray, name: str, start: int) -> int:
@@ -236,11 +229,9 @@ class _Numbers(Differences):
         points = np.where(np.isfinite(values).all(axis=0), gap, 0.0)
         for place, row in enumerate(points.argmax(axis=1).tolist()):
             output, most_here = self.outputs[place], float(points[place, row])
-            kept = self.largest.get(output)
-            if most_here and (kept is None or most_here > kept.gap):
+            if most_here > self.largest.get(output, (0.0, {}))[0]:
                 point = zip(self.pair.inputs, values[:, row].tolist(), strict=True)
-                was, now = float(old[place, row]), float(new[place, row])
-                self.largest[output] = _Largest(most_here, was, now, dict(point))
+                self.largest[output] = most_here, dict(point)
         return int((gap > 0.0).any(axis=0).sum())
 
     def _numbers(self, values: FloatArray) -> list[FloatArray]:
@@ -254,7 +245,7 @@ class _Numbers(Differences):
 
     def witness(self, name: str) -> AuditAnswer:
         """Return where an output differs most, of what was seen."""
-        largest = self.largest[name]
+        largest, start = self.largest[name]
         place, inputs = self.outputs.index(name), self.pair.inputs
 
         def numbers(point: Mapping[str, Fraction]) -> tuple[float, float, float]:
@@ -263,9 +254,9 @@ class _Numbers(Differences):
             return float(_gap(was, now)[0]), float(was[0]), float(now[0])
 
         def is_large(point: Mapping[str, Fraction]) -> bool:
-            return numbers(point)[0] >= largest.gap * _MOST_SHOWN
+            return numbers(point)[0] >= largest * _MOST_SHOWN
 
-        row = {key: Fraction(value) for key, value in largest.point.items()}
+        row = {key: Fraction(value) for key, value in start.items()}
         point = simplified(row, self.pair.domain, is_large)
         gap, was, now = numbers(point)
         facts = {"now": _text(now), "was": _text(was), "how": _HOW}
@@ -281,14 +272,14 @@ class _Numbers(Differences):
         if bound is None:
             state = Declined("FTD02", "nothing bounds what its rules conclude")
             return audit_answer("FT801.no-bound", title, state, facts={"output": name})
-        low, high, largest = 0.0, outwards(bound[0])[1], self.largest.get(name)
-        if largest is not None and math.isfinite(largest.gap):
-            is_within = all(
-                side.low <= largest.point[side.variable] <= side.high
-                for side in self.pair.domain.sides
-                if side.variable in largest.point
-            )
-            low = min(largest.gap, high) if is_within else 0.0
+        high = outwards(bound[0])[1]
+        gap, point = self.largest.get(name, (0.0, {}))
+        is_within = math.isfinite(gap) and all(
+            side.low <= point[side.variable] <= side.high
+            for side in self.pair.domain.sides
+            if side.variable in point
+        )
+        low = min(gap, high) if is_within else 0.0
         facts: dict[str, FactValue] = {"output": name, "most": high}
         bracket = Bracket(of, low, high, bound[1])
         return audit_answer("FT801.bound", title, bracket, facts=facts)

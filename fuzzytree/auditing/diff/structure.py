@@ -61,13 +61,7 @@ class _Spot(NamedTuple):
 class Structure:
     """The changes from one model to another, both as rules or both as systems.
 
-    Args:
-        old: The first one.
-        new: The second one.
-        domain: Where they are compared.
-        evidence: How decisions that differ come about.
-        models: The two as their files have them.
-        files: The files.
+    `models` are the two as their `files` have them.
     """
 
     def __init__(
