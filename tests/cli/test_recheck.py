@@ -12,7 +12,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.rechecking.sentences import LIMITS
-from tests.auditing.diff.test_system_numbers import tipper
+from tests.auditing.diff.test_numbers import tipper
 
 CODES = ("--select", "FT1,FT301,FT404")
 

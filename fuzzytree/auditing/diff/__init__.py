@@ -9,6 +9,6 @@ In reading order:
 - `samples`: two models side by side, and the rows on which they are compared
 - `agreement`, `regions`: do two models decide alike everywhere; a box where they differ
 - `decisions`: where two rule bases decide differently
-- `bounds`, `numbers`: how far the outputs of two systems are apart
+- `numbers`: how far the outputs of two systems are apart
 - `differences`: all of it, for two models
 """

@@ -167,13 +167,6 @@ def test_a_cut_that_moved_by_one_double_differs_there_and_nowhere_else() -> None
     assert [claim.label for claim in result.claims] == ["b", "a"]
 
 
-def test_a_curve_that_changed_outside_of_the_domain_changes_nothing() -> None:
-    result = state(crisp(5.0), crisp(6.0))
-    assert result == Proved(
-        "of 0 pairs of rules of other classes none decides at one point"
-    )
-
-
 def tie(rise: float) -> tuple[RuleBase, RuleBase]:
     """Return two rules that meet at one point, in both orders."""
     falls = Term("falls", Points((0.0, 1.0), (1.0, 0.0)))

@@ -19,9 +19,9 @@ from fuzzytree.auditing.decide.states import (
     Witness,
     point_of,
 )
-from fuzzytree.auditing.diff.bounds import most
 from fuzzytree.auditing.diff.differences import difference, joined_domain
 from fuzzytree.auditing.diff.keys import Curves, Keys
+from fuzzytree.auditing.diff.numbers import most
 from fuzzytree.auditing.diff.records import Difference
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditSettings
