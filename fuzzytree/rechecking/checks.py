@@ -448,8 +448,8 @@ def check_sample(state: Sampled) -> None:
 
 def decide(script: Script, report: Report, questions: Questions, solver: str) -> None:
     """Ask a solver for all claims, and note which answers it confirms."""
-    every = [claim for _, claims in questions for claim in claims]
-    if not every and not solver:
+    every = [claims for _, claims in questions]
+    if not any(every) and not solver:
         return
     results = ask(script.text(), every, solver)
     replies = iter(results.answers)

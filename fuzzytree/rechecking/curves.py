@@ -128,10 +128,14 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
         return max(least, -most, ZERO), max(abs(least), abs(most))
     if curve.kind == "formula":
         raise UndecidedError("a curve (formula) is not evaluated here")
-    degree = _CURVES[curve.kind][1]
     inner = (x for x in turns(curve) if low < x < high)
-    ends = [degree(x, n) for x in (low, *inner, high)]
+    ends = [_degree(curve.kind, x, n) for x in (low, *inner, high)]
     return min(end for end, _ in ends), max(end for _, end in ends)
+
+
+@functools.lru_cache(maxsize=1 << 14)
+def _degree(kind: str, x: Fraction, numbers: Numbers) -> Between:
+    return _CURVES[kind][1](x, numbers)
 
 
 def _side(

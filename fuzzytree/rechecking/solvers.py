@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import re
 import shlex
 import shutil
@@ -14,8 +15,9 @@ from typing import Any, NamedTuple
 from fuzzytree.rechecking.claims import Statement
 from fuzzytree.rechecking.outcomes import CannotRunError
 
-STEPS_OF_A_CLAIM, STEPS_IN_ALL = 2_000_000, 40_000_000
-"""Of z3's own count of its work, which is the same on any machine."""
+STEPS_OF_A_CLAIM, STEPS_OF_MORE, STEPS_IN_ALL = 2_000_000, 100_000, 40_000_000
+"""Of z3's own count of its work, which is the same on any machine: for a claim, for one
+beside a claim of the same answer that stays unknown, and for all of them."""
 MOST_SECONDS = 3600
 """After which a program that does not end is stopped."""
 _ARGUMENTS = {
@@ -48,23 +50,26 @@ def _block(claim: Statement) -> str:
     )
 
 
-def ask(text: str, statements: Sequence[Statement], program: str = "") -> Results:
+def ask(
+    text: str, statements: Sequence[Sequence[Statement]], program: str = ""
+) -> Results:
     """Ask a solver for each claim about a model.
 
     Args:
         text: The model.
-        statements: The claims.
+        statements: The claims of each answer.
         program: The path of a program, and its arguments; the package z3 by default.
 
     Returns:
         The answers; of a solver without a name if there is none.
     """
+    every = [*itertools.chain(*statements)]
     if program:
-        return _ask_program(text, statements, program)
+        return _ask_program(text, every, program)
     try:
         z3: Any = importlib.import_module("z3")
     except ImportError:
-        return Results("", ["unknown"] * len(statements))
+        return Results("", ["unknown"] * len(every))
     name = f"z3 {z3.get_version_string()}"
     context, answers, left = z3.Context(), list[str](), STEPS_IN_ALL
 
@@ -80,8 +85,11 @@ def ask(text: str, statements: Sequence[Statement], program: str = "") -> Result
         return int(match[0]) if match else 0
 
     run(text)
-    for claim in statements:
-        steps = min(left, STEPS_OF_A_CLAIM)
+    claims = ((claim, place) for place, of in enumerate(statements) for claim in of)
+    unknown: set[int] = set()
+    for claim, place in claims:
+        most = STEPS_OF_MORE if place in unknown else STEPS_OF_A_CLAIM
+        steps = min(left, most)
         if steps <= 0:
             answers.append("unknown")
             continue
@@ -91,6 +99,8 @@ def ask(text: str, statements: Sequence[Statement], program: str = "") -> Result
         if not _ANSWER.fullmatch(reply):
             raise CannotRunError(f"{name}: it answers {reply!r:.100}")
         answers.append(reply)
+        if reply == "unknown":
+            unknown.add(place)
     return Results(name, answers)
 
 

@@ -28,7 +28,7 @@ from fuzzytree.model import BoolArray, FloatArray
 Side = Choice[0, 1]
 Factor = tuple[str, Literal]
 
-STEPS = 4_000_000
+STEPS = 2_000_000
 """The most steps of a search."""
 
 _SMALL = 2e-3  # of a piece between two knots: no box is halved further
@@ -134,7 +134,7 @@ def search_boxes(
     seen = slivers = 0
     while len(boxes):
         try:
-            own.spend(100 + base.count * (20 + len(boxes) // 2))
+            own.spend(100 + base.count * (20 + 2 * len(boxes)))
         except OutOfStepsError:
             if budget.is_spent:
                 raise

@@ -264,6 +264,8 @@ class Pairs:
         for name, sets in self.sets.items():
             if sets[i] == sets[j]:
                 continue
+            if self._is_far(name, sets[i], sets[j], limit):
+                return Distance(ONE, ONE, name)
             key = name, frozenset((sets[i], sets[j])), limit
             if key not in self._distances:
                 columns = self.columns(name, sets[i], sets[j])
@@ -276,6 +278,20 @@ class Pairs:
         if any(rule.norm == "product" for rule in rules) and total > limit:
             worst = worst._replace(high=max(worst.high, total))
         return worst
+
+    def _is_far(self, name: str, mine: _Set, theirs: _Set, limit: Fraction) -> bool:
+        """Return whether doubles show at knots that two literals are apart."""
+        every = [literal for literal, _ in (*mine, *theirs)]
+        if (
+            len(mine) != 1
+            or len(theirs) != 1
+            or any(len(f.functions) > 1 for f in every)
+        ):
+            return False
+        sides = self.base.axes[name].stretches.sides
+        (low, high), (least, most) = (sides[literal] for literal in every)
+        apart = max((low[0].at - most[0].at).max(), (least[0].at - high[0].at).max())
+        return bool(apart > float(limit) + 1e-9)
 
     # --- where they tie
 
