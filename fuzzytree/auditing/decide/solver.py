@@ -227,26 +227,26 @@ class Solver:
         most = min(resources, _PER_STEP * max(budget.left, 1))
         solver = self._open if self.is_linear else self._new()
         solver.push()
-        solver.set("rlimit", most)
-        places = range(self.base.count) if rules is None else dict.fromkeys(rules)
-        for place in places:
-            solver.add(self.rule_facts[place])
-            for key in self.base.rules[place].literals:
-                solver.add(*self._of_literal(key))
-        solver.add(formula)
-        before = _used(solver)
-        result = solver.check()
-        model = solver.model() if result == z3.sat else None
-        budget.spend(min(max(_used(solver) - before, 0), most) // _PER_STEP + 100)
-        values: list[Any] = []
-        if model is not None:
-            values = [
-                model.eval(x, model_completion=True) for x in self.inputs.values()
-            ]
-        solver.pop()
+        try:
+            solver.set("rlimit", most)
+            places = range(self.base.count) if rules is None else dict.fromkeys(rules)
+            for place in places:
+                solver.add(self.rule_facts[place])
+                for key in self.base.rules[place].literals:
+                    solver.add(*self._of_literal(key))
+            solver.add(formula)
+            before = _used(solver)
+            result = solver.check()
+            budget.spend(min(max(_used(solver) - before, 0), most) // _PER_STEP + 100)
+            values = []
+            if result == z3.sat:
+                model, terms = solver.model(), self.inputs.values()
+                values = [model.eval(x, model_completion=True) for x in terms]
+        finally:  # or the next question would have this one's facts as well
+            solver.pop()
         if result == z3.unsat:
             return Proved("z3")
-        if model is None:
+        if result != z3.sat:
             return Open("z3 gave up")
         point = dict(zip(self.inputs, map(_fraction, values), strict=True))
         if self.base.contains(point) and holds(point):

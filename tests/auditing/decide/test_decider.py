@@ -176,6 +176,14 @@ def test_a_smaller_budget_ends_the_same_way_each_time() -> None:
     assert "out of steps" in ends.pop()
 
 
+def test_a_question_whose_budget_ends_leaves_no_facts_behind() -> None:
+    solver = Solver(Base.of(*random_base(2, sums=1)), z3)
+    with pytest.raises(OutOfStepsError):
+        solver.ask(Question((2, 3), level=Fraction(9, 10)), Budget(50))
+    answer = solver.ask(Question((2, 3), level=Fraction(7, 10)), Budget())
+    assert isinstance(answer, Point)
+
+
 def test_trees_with_sums_are_decided() -> None:
     for seed in range(4):
         tree = random_tree(seed)
