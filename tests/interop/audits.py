@@ -164,10 +164,11 @@ BY_HAND = (
     ),
     Verified(
         "fuzzylite mamdani/SimpleDimmer.fll",
-        "no rule fires where 'Ambient' is 0",
+        "no rule has a strength of 0.1 where 'Ambient' is 0.975 to 1",
         "`Ambient` has the range 0 to 1, `DARK` is `Triangle 0 0.25 0.5` and `BRIGHT` "
-        "is `Triangle 0.5 0.75 1`: at 0 and at 1 themselves every degree is 0, and the "
-        "answer is the default, which the file sets to nan.",
+        "is `Triangle 0.5 0.75 1`, which falls along 4 (1 - x): it is below 0.1 from "
+        "0.975 on. At 0 and at 1 themselves every degree is 0, and the answer is the "
+        "default, which the file sets to nan.",
     ),
     Verified(
         "fuzzylite hybrid/tipper.fll",

@@ -14,7 +14,6 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "audits.md"
 Need = Callable[[str], str]
 
 
-@pytest.mark.skip(reason="20 curves on one axis take minutes; the page is older")
 @pytest.mark.heavy
 def test_every_real_rule_base_is_audited_and_the_page_says_what_was_found(
     program: Need, library: Need
