@@ -41,7 +41,10 @@ class Case:
     Attributes:
         sides: The sides of the domain by name.
         numbers: The numbers of the rules, from 1.
+        has_all_rules: Whether the text for a solver has rules that no claim names.
     """
+
+    has_all_rules = True
 
     def __init__(self, facts: Audit | Difference, model: Model) -> None:
         self.model, self.rules = model, model.rules
@@ -83,7 +86,12 @@ class Case:
         """Add the model to a text, within the domain or for all numbers."""
         sides = self.sides if is_bounded else {}
         ends = {n: (Fraction(s.low), Fraction(s.high)) for n, s in sides.items()}
-        script.add(self.model, ends, {n: side.points for n, side in sides.items()})
+        script.add(
+            self.model,
+            ends,
+            {n: side.points for n, side in sides.items()},
+            has_rules=self.has_all_rules,
+        )
 
     def reaches(self, number: int, sign: str, level: Fraction) -> str:
         """Return that a rule's strength is `>` or `>=` a level."""
@@ -91,7 +99,7 @@ class Case:
 
     def symbol(self, number: int) -> str:
         """Return the strength of a rule."""
-        return self.script.symbol(self.name(number))
+        return self.script.add_rule(self.rule(number), self.rules)
 
     def over(self, number: int, rivals: Iterable[int]) -> str:
         """Return that a rule fires and is above rivals."""

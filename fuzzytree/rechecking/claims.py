@@ -399,12 +399,13 @@ def fires(case: Case, answer: Answer) -> Statements:
 def covers(case: Case, answer: Answer) -> Statements:
     """Claim that some rule is everywhere as strong as where it is least, at least."""
     low = Fraction(answer.measure("strength where it is least, at least"))
+    symbols = [case.symbol(n) for n in case.numbers]  # whose curves may be no lines
     levels = {low} if case.script.is_exact else set()
     if answer.message == "FT301.reaches":
         levels.add(Fraction(case.settings.epsilon))
     for level in levels - {ZERO}:
         least = case.script.number(level)
-        weak = (f"(< {case.symbol(n)} {least})" for n in case.numbers)
+        weak = (f"(< {symbol} {least})" for symbol in symbols)
         yield Statement(f"some rule reaches {float(level):g} everywhere", all_of(weak))
 
 

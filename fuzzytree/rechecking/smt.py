@@ -140,14 +140,17 @@ class Script:
         model: Model,
         ends: Mapping[str, Ends],
         values: Mapping[str, Sequence[Fraction]],
+        *,
+        has_rules: bool = True,
     ) -> None:
-        """Add the inputs, terms and rules of a model.
+        """Add the inputs of a model, and its rules with their terms.
 
         Args:
             model: The model.
             ends: The values of each variable of which they are known.
             values: Further values of inputs, or the only ones of categories; those
                 that the model declares unless given.
+            has_rules: Whether all rules are added now, or only those of claims later.
         """
         self._values |= values
         self._ends |= ends
@@ -155,7 +158,7 @@ class Script:
         self._lines.append(f"; {model.name}: {len(model.rules.rules)} rules")
         for variable in model.variables.values():
             self._add_variable(variable)
-        for rule in model.rules.rules:
+        for rule in model.rules.rules if has_rules else ():
             self.add_rule(rule, model.rules)
 
     # --- words
