@@ -299,7 +299,10 @@ class Base:
 
     @cached_property
     def samples(self) -> list[FloatArray]:
-        """Values of each input at points that rows can have; half of them at knots."""
+        """Values of each input at points that rows can have; half of them at knots.
+
+        At the first of them rules are as high as they get, one after the other.
+        """
         chance = np.random.default_rng(self.seed)
         columns: list[FloatArray] = []
         for name, axis in self.inputs.items():
@@ -319,6 +322,11 @@ class Base:
             if axis.is_open:
                 drawn = np.where(drawn <= float(axis.low), float(axis.high), drawn)
             columns.append(drawn)
+        by_name = dict(zip(self.inputs, columns, strict=True))
+        for number, rule in enumerate(self.rules[: SAMPLES // 4]):
+            for name, literal in rule.literals:
+                if name in by_name:
+                    by_name[name][number] = float(self.axes[name].peak(literal))
         return columns
 
     def _places(self, name: str, axis: Axis) -> FloatArray:

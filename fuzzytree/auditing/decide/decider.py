@@ -56,7 +56,7 @@ class Decider:
         base = self.base
         if base.is_empty:
             return Proved("the domain has no point")
-        point = self.sampled(question, budget) or self._peak(question, budget)
+        point = self.sampled(question, budget)
         if point is not None:
             return point
         rules = [base.rules[i] for i in question.rules]
@@ -114,20 +114,6 @@ class Decider:
             ):
                 return Point(point, "a point that was drawn")
         return None
-
-    def _peak(self, question: Question, budget: Budget) -> Point | None:
-        """Return the point at which a rule is highest, if it answers a question."""
-        base = self.base
-        if len(question.reach) != 1 or base.is_coupled:
-            return None
-        literals = base.rules[question.reach[0]].literals
-        budget.spend(20 * sum(len(base.rules[i].literals) for i in question.rules))
-        values = {name: base.axes[name].peak(literal) for name, literal in literals}
-        point = base.point(values)
-        if point is None or not base.contains(point):
-            return None
-        is_answer = question.holds(*base.strengths(point, question.rules))
-        return Point(point, "where a rule is highest") if is_answer else None
 
     def exact(
         self, number: int, rules: Sequence[int], budget: Budget

@@ -39,7 +39,7 @@ def solver_for(base: Base, budget: Budget) -> Solver | None:
         return None
     kept: Solver | None = vars(base).get("solver")
     if kept is None:
-        budget.spend(500 * base.size)
+        budget.spend(100 * base.size)
         kept = vars(base)["solver"] = Solver(base, z3)
     return kept
 
