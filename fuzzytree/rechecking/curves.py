@@ -51,6 +51,11 @@ class Curve(NamedTuple):
     hedges: tuple[str, ...] = ()
 
     @property
+    def is_known(self) -> bool:
+        """Whether its degrees are known here; of a formula they are not."""
+        return self.kind not in ("formula", "unknown")
+
+    @property
     def top(self) -> Fraction:
         """No degree is larger."""
         return ONE if self.hedges else self.height
@@ -72,8 +77,10 @@ def turns(curve: Curve) -> list[Fraction]:
         return [mean + x for x in far]
     if curve.kind in ("product", "difference"):
         return sorted({x for part in n for x in turns(part)})
+    if not curve.is_known:
+        return []
     ends = {*n, (n[0] + n[1]) / 2} if curve.kind in ("s", "semi ellipse") else {*n}
-    return [] if curve.kind == "formula" else sorted(ends)
+    return sorted(ends)
 
 
 def bounds(curve: Curve, low: Fraction, high: Fraction) -> Between:
@@ -126,8 +133,8 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
             return a[0] * b[0], a[1] * b[1]
         least, most = a[0] - b[1], a[1] - b[0]
         return max(least, -most, ZERO), max(abs(least), abs(most))
-    if curve.kind == "formula":
-        raise UndecidedError("a curve (formula) is not evaluated here")
+    if not curve.is_known:
+        raise UndecidedError(f"a curve ({n[0]}) is not evaluated here")
     inner = (x for x in turns(curve) if low < x < high)
     ends = [_degree(curve.kind, x, n) for x in (low, *inner, high)]
     return min(end for end, _ in ends), max(end for _, end in ends)
@@ -426,7 +433,7 @@ def _trapezoid(left: Any, low: Fraction, high: Fraction, right: Any) -> Curve:
 
 def _curve(kind: str, data: Any) -> Curve:
     if kind == "formula":
-        return Curve(kind, (str(data),))
+        return Curve(kind, (kind,))
     if kind == "points":
         points = [(number_of(x), number_of(y)) for x, y in data]
         _check_order(x for x, _ in points)
@@ -459,7 +466,7 @@ def _curve(kind: str, data: Any) -> Curve:
         b, c = inner if kind == "trapezoid" else inner * 2
         return _trapezoid(a, b, c, d)
     if kind not in ("singleton", "at least", "at most"):
-        raise CannotRunError(f"a curve ({kind:.60}) is not known")
+        return Curve("unknown", (f"{kind:.60}",))  # or one that is added later
     x = number_of(data)
     left = -math.inf if kind == "at most" else x
     return _trapezoid(left, x, x, math.inf if kind == "at least" else x)

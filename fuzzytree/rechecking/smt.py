@@ -256,7 +256,7 @@ class Script:
         degree, height = self.symbol(name), self.number(curve.top)
         self._lines.append(f"(declare-const {degree} Real) ; a curve that is no line")
         is_positive = False
-        if curve.kind != "formula":
+        if curve.is_known:
             ends = self._region(variable, curve)
             is_positive = variable.name in self._ends and bounds(curve, *ends)[0] > 0
             sides = (", at least", ", at most")
