@@ -40,7 +40,7 @@ from fuzzytree.rechecking.outcomes import (
     Report,
     UndecidedError,
 )
-from fuzzytree.rechecking.records import Audit, Declined, Proved, built, read_json
+from fuzzytree.rechecking.records import Audit, Declined, Proved, decode, read_json
 from fuzzytree.rechecking.sentences import (
     LIMITS,
     MESSAGES,
@@ -55,7 +55,7 @@ from fuzzytree.rechecking.words import (
     DATE_UNIT,
     MISSING,
     is_plain,
-    listed,
+    side_values,
     stretch,
     stretch_word,
     value_word,
@@ -73,7 +73,6 @@ __all__ = [
     "confirm",
     "digest_of",
     "is_plain",
-    "listed",
     "model_text",
     "names_in",
     "open_interval",
@@ -81,6 +80,7 @@ __all__ = [
     "recheck_difference",
     "recheck_files",
     "sentence_of",
+    "side_values",
     "stretch",
     "stretch_word",
     "value_word",
@@ -121,7 +121,7 @@ def recheck(
 def _read(
     audit: bytes, model: bytes, names: tuple[str, str] = ("the audit", "model.yaml")
 ) -> tuple[Audit, Case]:
-    result: Audit = built(Audit, read_json(audit, names[0]), names[0])
+    result: Audit = decode(Audit, read_json(audit, names[0]), names[0])
     left_out = [o.subject for o in result.answers if isinstance(o.state, Declined)]
     whole = Model(model, names[1], left_out)
     if whole.form == "system" and result.policy.decision == "strongest":

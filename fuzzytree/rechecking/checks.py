@@ -17,8 +17,8 @@ from fuzzytree.rechecking.claims import (
     WITNESSES,
     Check,
     Statement,
+    leave_open,
     no_gap,
-    not_decided,
 )
 from fuzzytree.rechecking.outcomes import Report, UndecidedError, require
 from fuzzytree.rechecking.records import (
@@ -372,7 +372,7 @@ def _check_state(case: Case, report: Report, answer: Answer) -> list[Statement]:
     kind = type(state).__name__.upper()
     if isinstance(state, Proved):
         require(bool(state.how), "it is PROVED, without how")
-        return _claims(case, answer, PROOFS.get(name, not_decided))
+        return _claims(case, answer, PROOFS.get(name, leave_open))
     if isinstance(state, Declined):
         is_reason = state.code in {f"FTD0{n}" for n in range(1, 9)}
         require(is_reason and bool(state.reason), "declined, and not for a reason")

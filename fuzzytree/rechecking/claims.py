@@ -144,7 +144,7 @@ def without(case: Case, answer: Answer) -> Rule:
     raise DoesNotHoldError("it is of no proposition of the rule")
 
 
-def needed(case: Case, answer: Answer) -> None:
+def matters(case: Case, answer: Answer) -> None:
     """Check that without a rule, or a proposition, another class is predicted."""
     point, place = case.point_of(answer.witness.point), answer.rules[0] - 1
     rest = [without(case, answer)] if answer.code == "FT107" else []
@@ -157,7 +157,7 @@ def needed(case: Case, answer: Answer) -> None:
     require(answer.facts.get("then") == after, f"it becomes {after!r}")
 
 
-def not_needed(case: Case, answer: Answer) -> Statements:
+def never_matters(case: Case, answer: Answer) -> Statements:
     """Claim that the same is decided without a rule, or one of its propositions."""
     (number,) = answer.rules
     own = [*map(case.symbol, case.numbers)]
@@ -169,13 +169,13 @@ def not_needed(case: Case, answer: Answer) -> Statements:
     else:
         others[number - 1] = "0.0"
     for is_strict in (True, False):
-        yield unchanged(name, number, (case, own), (case, others), is_strict=is_strict)
+        yield agreement(name, number, (case, own), (case, others), is_strict=is_strict)
 
 
 Model = tuple[Case, list[str]]
 
 
-def unchanged(
+def agreement(
     name: str, number: int, old: Model, new: Model, *, is_strict: bool
 ) -> Statement:
     """Claim that where a rule of a model decides, no other class of another one does.
@@ -278,7 +278,7 @@ def same_class(case: Case, answer: Answer) -> Statements:
 # --- pairs of rules
 
 
-def hidden(case: Case, answer: Answer) -> Statements:
+def dominance(case: Case, answer: Answer) -> Statements:
     """Claim that some rules are nowhere weaker than the first one."""
     weak, *strong = answer.rules
     is_alike = answer.code == "FT104"
@@ -291,7 +291,7 @@ def hidden(case: Case, answer: Answer) -> Statements:
     require(is_before, "the order of the rules is another one")
 
 
-def no_other_hidden(case: Case, answer: Answer) -> Statements:
+def no_other_dominance(case: Case, answer: Answer) -> Statements:
     """Claim that each rule of other pairs is somewhere the stronger one."""
     is_alike = answer.code == "FT104"
     pairs = case.live_pairs(alike=is_alike)
@@ -504,7 +504,7 @@ def counts(case: Case, answer: Answer) -> None:
     raise UndecidedError("areas of terms")
 
 
-def unused(case: Case, answer: Answer) -> None:
+def idle_names(case: Case, answer: Answer) -> None:
     """Check that the findings are the terms and variables that no rule uses."""
     model, labels = case.model, case.model.labels_in_use
     names = {variable for variable, _ in labels}
@@ -523,7 +523,7 @@ def _check_count(answer: Answer, name: str, count: int) -> None:
     require(answer.measure(name) == count, f"{name}: {count} are counted here")
 
 
-def not_decided(case: Case, answer: Answer) -> None:
+def leave_open(case: Case, answer: Answer) -> None:
     """Leave an answer undecided."""
     raise UndecidedError("no solver of lines and polynomials is asked for it")
 
@@ -543,11 +543,11 @@ PROOFS = _table(
         silent: "FT101.weight-0 FT101.never-true",
         live_leaves: "FT101.leaves",
         dead_leaf: "FT101.leaf-excluded FT101.leaf-outside FT101.leaf-unmet",
-        hidden: "FT104.subsumed FT105.masked FT105.weaker",
-        no_other_hidden: "FT104.others FT105.others",
+        dominance: "FT104.subsumed FT105.masked FT105.weaker",
+        no_other_dominance: "FT104.others FT105.others",
         same: "FT106.same FT106.contradiction FT106.different",
         no_others_same: "FT106.others",
-        not_needed: "FT103.superfluous FT107.irrelevant",
+        never_matters: "FT103.superfluous FT107.irrelevant",
         apart: "FT201.never FT201.unlisted",
         same_class: "FT204.alike",
         fires: "FT301.fires",
@@ -555,8 +555,8 @@ PROOFS = _table(
         heights: "FT401.reached",
         low_term: "FT401.low FT401.empty",
         counts: "FT202.others FT402.sound FT403.others FT403.unlisted",
-        unused: "FT404.unused FT404.used",
-        not_decided: "FT107.more FT203.leaves FT402.outside FT402.peaks "
+        idle_names: "FT404.unused FT404.used",
+        leave_open: "FT107.more FT203.leaves FT402.outside FT402.peaks "
         "FT402.subnormal FT403.equal FT403.within FT403.similar",
     }
 )
@@ -566,7 +566,7 @@ WITNESSES = _table(
     {
         wins: "FT101.wins FT101.fires FT102.leads",
         ties: "FT101.decides-by-place FT202.tie",
-        needed: "FT103.needed FT107.needed",
+        matters: "FT103.needed FT107.needed",
         conflict: "FT201.conflict",
         raw_rules_differ: "FT203.differs",
         leaf_region: "FT205.region",

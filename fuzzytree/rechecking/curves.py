@@ -94,10 +94,10 @@ def bounds(curve: Curve, low: Fraction, high: Fraction) -> Between:
         degrees += [*start, *end] if low < high else []
         result = min(degrees), max(degrees)
     else:
-        result = _enclosed(curve, low, high)
+        result = _enclosure(curve, low, high)
         result = max(result[0], ZERO) * curve.height, min(result[1], ONE) * curve.height
     for hedge in reversed(curve.hedges):
-        result = _hedged(hedge, result)
+        result = _apply_hedge(hedge, result)
     return result
 
 
@@ -116,7 +116,7 @@ def _sides(knots: tuple[Knot, ...], x: Fraction) -> tuple[Fraction, ...]:
     return (end.after,) * 3
 
 
-def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
+def _enclosure(curve: Curve, low: Fraction, high: Fraction) -> Between:
     """Return the degrees of a curve that is no line.
 
     All but LR sets are monotone between the places where they turn, or are two curves
@@ -128,7 +128,7 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
         right = _side(low - n[0], high - n[0], n[2])
         return min(left[0], right[0]), min(left[1], right[1])
     if curve.kind in ("product", "difference"):
-        a, b = (_enclosed(part, low, high) for part in n)
+        a, b = (_enclosure(part, low, high) for part in n)
         if curve.kind == "product":
             return a[0] * b[0], a[1] * b[1]
         least, most = a[0] - b[1], a[1] - b[0]
@@ -193,7 +193,7 @@ def _s(x: Fraction, start: Fraction, end: Fraction) -> Fraction:
 # --- functions of the reals, enclosed
 
 
-def _rising(function: Callable[[Decimal], Decimal], x: Fraction) -> Between:
+def _increase_bounds(function: Callable[[Decimal], Decimal], x: Fraction) -> Between:
     """Return between which numbers a rising function of x lies.
 
     Decimals round its values to the nearest one, so its neighbours are beyond.
@@ -203,17 +203,17 @@ def _rising(function: Callable[[Decimal], Decimal], x: Fraction) -> Between:
     return Fraction(_DIGITS.next_minus(ends[0])), Fraction(_DIGITS.next_plus(ends[1]))
 
 
-def _falling(x: Fraction) -> Between:
+def _exp_minus(x: Fraction) -> Between:
     """Return between which numbers e**-x lies, x >= 0."""
     if not x:
         return ONE, ONE
     if x > _FAR:
         return ZERO, Fraction(1, 2**_FAR)
-    return _rising(_DIGITS.exp, -x)
+    return _increase_bounds(_DIGITS.exp, -x)
 
 
 def _ln(x: Fraction) -> Between:
-    return _rising(_DIGITS.ln, x)
+    return _increase_bounds(_DIGITS.ln, x)
 
 
 def _root(x: Fraction) -> Between:
@@ -228,12 +228,12 @@ def _power(x: Fraction, power: Fraction) -> Between:
     if x in (0, 1):
         return x, x
     low, high = _ln(x)
-    return _falling(-low * power)[0], min(_falling(-high * power)[1], ONE)
+    return _exp_minus(-low * power)[0], min(_exp_minus(-high * power)[1], ONE)
 
 
 def _logistic(z: Fraction) -> Between:
     """Return between which numbers 1 / (1 + e**-z) lies."""
-    low, high = _falling(abs(z))
+    low, high = _exp_minus(abs(z))
     ends = low / (1 + low), high / (1 + high)
     return ends if z < 0 else _complement(ends)
 
@@ -262,7 +262,7 @@ def _bell(x: Fraction, n: Numbers) -> Between:
 
 
 def _gaussian(x: Fraction, n: Numbers) -> Between:
-    return _falling(((x - n[0]) / n[1]) ** 2 / 2)
+    return _exp_minus(((x - n[0]) / n[1]) ** 2 / 2)
 
 
 def _concave(x: Fraction, n: Numbers) -> Between:
@@ -285,7 +285,7 @@ _CURVES: dict[str, tuple[str, Callable[[Fraction, Numbers], Between]]] = {
     "right half": ("mean, deviation", lambda x, n: _gaussian(max(x, n[0]), n)),
     "bell": ("center, width, slope", _bell),
     "sigmoid": ("inflection, slope", lambda x, n: _logistic(n[1] * (x - n[0]))),
-    "spike": ("center, width", lambda x, n: _falling(10 * abs(x - n[0]) / n[1])),
+    "spike": ("center, width", lambda x, n: _exp_minus(10 * abs(x - n[0]) / n[1])),
     "s": ("start, end", lambda x, n: _exact(_s(x, *n))),
     "cosine": ("center, width", _cosine),
     "concave": ("inflection, end", _concave),
@@ -319,7 +319,7 @@ def _complement(degree: Between) -> Between:
     return 1 - degree[1], 1 - degree[0]
 
 
-def _hedged(hedge: str, degree: Between) -> Between:
+def _apply_hedge(hedge: str, degree: Between) -> Between:
     if hedge == "not":
         return _complement(degree)
     low, high = map(_share, degree)

@@ -295,7 +295,7 @@ class Model:
                 continue
             for place, way in enumerate(ways, 1):
                 whole = f"way {place} of {name}" if len(ways) > 1 else name
-                when = self._weighted(way, weight)
+                when = self._with_weight(way, weight)
                 rules.append(Rule(when, text, whole, number, then))
         curves = {name: {**v.curves} for name, v in self.variables.items()}
         for name, term in _labels(rules):
@@ -319,7 +319,7 @@ class Model:
         """Whether no rule of a system is left out."""
         return {*self.absent} == {*self.silent}
 
-    def _weighted(
+    def _with_weight(
         self, way: tuple[Proposition, ...], weight: Fraction
     ) -> tuple[Proposition, ...]:
         """Return propositions with a weight: all of a minimum, one of a product."""

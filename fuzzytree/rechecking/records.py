@@ -269,17 +269,17 @@ _hints = lru_cache(get_type_hints)
 _LARGEST = sys.float_info.max
 
 
-def built(kind: Any, value: Any, where: str) -> Any:
+def decode(kind: Any, value: Any, where: str) -> Any:
     """Return facts as a record: every field must be there, and no other."""
     origin, choices = get_origin(kind), get_args(kind)
     if kind == State and isinstance(value, dict) and str(value.get("state")) in STATES:
         rest = {key: item for key, item in value.items() if key != "state"}
-        return built(STATES[value["state"]], rest, where)
+        return decode(STATES[value["state"]], rest, where)
     if origin is types.UnionType and type(None) in choices:
-        return None if value is None else built(choices[0], value, where)
+        return None if value is None else decode(choices[0], value, where)
     if origin is tuple and isinstance(value, list):
         every = enumerate(value, 1)
-        return tuple(built(choices[0], item, f"{where} {n}") for n, item in every)
+        return tuple(decode(choices[0], item, f"{where} {n}") for n, item in every)
     if origin is Literal and isinstance(value, str) and value in choices:
         return value
     if hasattr(kind, "_fields") and isinstance(value, dict):
@@ -288,7 +288,7 @@ def built(kind: Any, value: Any, where: str) -> Any:
             shown = ", ".join(n if n.isidentifier() else repr(n) for n in wrong)
             raise CannotRunError(f"{where}: missing or unknown: {shown:.200}")
         of = _hints(kind)
-        return kind(**{n: built(of[n], v, f"{where}, {n}") for n, v in value.items()})
+        return kind(**{n: decode(of[n], v, f"{where}, {n}") for n, v in value.items()})
     number: Any = value
     if kind is float and type(value) in (int, float) and abs(number) <= _LARGEST:
         return float(number)

@@ -57,7 +57,7 @@ def sentence_of(answer: Any) -> str:
         for o in answer.region
     ]
     facts |= {"subject": answer.subject, "region": region} | {**answer.facts}
-    return rendered(answer.message, facts)
+    return render(answer.message, facts)
 
 
 def names_in(message: str) -> set[str]:
@@ -65,11 +65,11 @@ def names_in(message: str) -> set[str]:
     return {field[1] for field in _FIELD.finditer(MESSAGES[message].text)}
 
 
-def rendered(message: str, facts: Mapping[str, Fact]) -> str:
+def render(message: str, facts: Mapping[str, Fact]) -> str:
     """Return the sentence of a message.
 
     Example:
-        >>> rendered("FT404.used", {"variables in use": 1, "terms in use": 3})
+        >>> render("FT404.used", {"variables in use": 1, "terms in use": 3})
         'rules use 1 variable and 3 terms'
     """
 
@@ -78,10 +78,10 @@ def rendered(message: str, facts: Mapping[str, Fact]) -> str:
         return match[1] if is_whole else ""
 
     template = _PART.sub(part, MESSAGES[message].text)
-    return _FIELD.sub(lambda field: shown(facts[field[1]], field[2] or ""), template)
+    return _FIELD.sub(lambda field: express(facts[field[1]], field[2] or ""), template)
 
 
-def shown(fact: Fact, how: str) -> str:
+def express(fact: Fact, how: str) -> str:
     """Return a fact as a sentence shows it.
 
     `d` is a count, `n term` a count with its noun, `n term has|terms have` with two
@@ -91,7 +91,7 @@ def shown(fact: Fact, how: str) -> str:
     point. `?` is nothing.
 
     Example:
-        >>> shown(2, "n term has|terms have"), shown(0.25, "p"), shown(None, "q")
+        >>> express(2, "n term has|terms have"), express(0.25, "p"), express(None, "q")
         ('2 terms have', '25 %', 'no class')
     """
     match fact, how:
@@ -106,7 +106,7 @@ def shown(fact: Fact, how: str) -> str:
         case ((int() | float()), _) if how != "q":
             return _number(fact, how)
         case ((list() | tuple()), "within"):
-            texts = [_side(name, _closed, of) for name, *of in fact[:_MOST_SIDES]]
+            texts = [_side(name, _interval, of) for name, *of in fact[:_MOST_SIDES]]
             texts += ["so on"] * (len(fact) > _MOST_SIDES)
             return _where(texts, "here")
         case ((list() | tuple()), "above"):
@@ -144,7 +144,7 @@ def _side(
     return f"{name!r} is {show(*of) if len(of) == 2 else of[0]}"
 
 
-def _closed(low: Scalar, high: Scalar) -> str:
+def _interval(low: Scalar, high: Scalar) -> str:
     """Return an interval; one without a lower or an upper end as such."""
     if low is None or high is None:
         return f"at most {_six(high)}" if low is None else f"at least {_six(low)}"

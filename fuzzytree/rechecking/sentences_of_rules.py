@@ -95,14 +95,14 @@ class _Words:
         self.rest = rest
         return Is(variable, term, tuple(hedges), tuple(others))
 
-    def joined(self, word: str, level: int) -> Condition:
+    def condition(self, word: str, level: int) -> Condition:
         """Read parts that OR joins, each of parts that AND joins."""
         if level > MOST_LEVELS:
             raise ValueError(f"more than {MOST_LEVELS} levels")
         parts: list[Condition] = []
         while not parts or self.takes(word):
             is_or = word == "or"
-            parts.append(self.joined("and", level) if is_or else self._part(level))
+            parts.append(self.condition("and", level) if is_or else self._part(level))
         return parts[0] if len(parts) == 1 else Joint(word, tuple(parts))
 
     def _part(self, level: int) -> Condition:
@@ -110,7 +110,7 @@ class _Words:
         is_negated = bool(self.takes("not"))
         if is_negated or self.rest[-1:] == ["("]:
             self.needs("(")
-            result = self.joined("or", level + 1)
+            result = self.condition("or", level + 1)
             self.needs(")")
             return Joint("not", (result,)) if is_negated else result
         return self.proposition()
@@ -126,7 +126,7 @@ def read_condition(sentences: Sequence[str]) -> Condition | None:
     results: list[Condition] = []
     for text in sentences:
         words = _Words(text)
-        results.append(words.joined("or", 1))
+        results.append(words.condition("or", 1))
         if words.rest:
             raise ValueError("more behind the condition")
     if len(results) > 1:

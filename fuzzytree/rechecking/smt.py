@@ -64,7 +64,7 @@ def lines_of(curve: Curve, low: Fraction, high: Fraction) -> tuple[Knots, Knots]
     step = step if step <= part else step / 2
     start, end = math.floor(low / step) + 1, math.ceil(high / step)
     cells = [low, *(k * step for k in range(start, end)), high]
-    both = [_enclosed(curve, a, b) for a, b in itertools.pairwise(cells)]
+    both = [_line_ends(curve, a, b) for a, b in itertools.pairwise(cells)]
     under, over = (
         tuple(
             Knot(x, before, before if x == high else after, after)
@@ -80,12 +80,12 @@ def lines_of(curve: Curve, low: Fraction, high: Fraction) -> tuple[Knots, Knots]
     return under, over
 
 
-def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> tuple[Ends, Ends]:
+def _line_ends(curve: Curve, low: Fraction, high: Fraction) -> tuple[Ends, Ends]:
     """Return the ends of lines below and above a curve on an interval."""
     whole = bounds(curve, low, high)
     if whole[0] == whole[1]:
         return whole, whole
-    p, q = (_rounded(bounds(curve, x, x)[0]) for x in (low, high))
+    p, q = (_on_grid(bounds(curve, x, x)[0]) for x in (low, high))
     under = over = ZERO
     for k in range(PARTS):
         a, b = (Fraction(k + n, PARTS) for n in (0, 1))
@@ -93,25 +93,25 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> tuple[Ends, Ends]:
         ends = p + (q - p) * a, p + (q - p) * b
         under, over = min(under, least - max(ends)), max(over, most - min(ends))
     off = Fraction(1, _GRID)
-    below, above = _rounded(p + under) - off, _rounded(p + over) + off
+    below, above = _on_grid(p + under) - off, _on_grid(p + over) + off
     return (below, below + q - p), (above, above + q - p)
 
 
-def _rounded(x: Fraction) -> Fraction:
+def _on_grid(x: Fraction) -> Fraction:
     return Fraction(round(x * _GRID), _GRID)
 
 
 def all_of(formulas: Iterable[str]) -> str:
     """Return that all formulas are true."""
-    return _joined("and", formulas, "true")
+    return _connect("and", formulas, "true")
 
 
 def any_of(formulas: Iterable[str]) -> str:
     """Return that some formula is true."""
-    return _joined("or", formulas, "false")
+    return _connect("or", formulas, "false")
 
 
-def _joined(word: str, formulas: Iterable[str], empty: str) -> str:
+def _connect(word: str, formulas: Iterable[str], empty: str) -> str:
     every = [*dict.fromkeys(formulas)]
     if len(every) < 2:
         return every[0] if every else empty

@@ -16,7 +16,7 @@ from fuzzytree.rechecking.checks import (
     check_source,
     decide,
 )
-from fuzzytree.rechecking.claims import Statement, unchanged
+from fuzzytree.rechecking.claims import Statement, agreement
 from fuzzytree.rechecking.curves import Facts
 from fuzzytree.rechecking.models import Model
 from fuzzytree.rechecking.outcomes import Report, UndecidedError, require
@@ -28,7 +28,7 @@ from fuzzytree.rechecking.records import (
     Proved,
     Sampled,
     Witness,
-    built,
+    decode,
     read_json,
 )
 from fuzzytree.rechecking.smt import Script, all_of, any_of
@@ -51,7 +51,7 @@ def recheck_difference(
     Raises:
         CannotRunError: If one of them cannot be read, or the solver fails.
     """
-    facts: Difference = built(Difference, read_json(diff, names[0]), names[0])
+    facts: Difference = decode(Difference, read_json(diff, names[0]), names[0])
     models = Model(old, names[1]), Model(new, names[2])
     for whole, of in zip(models, ("old ", "new "), strict=True):
         whole.put_before_names(of)
@@ -135,7 +135,7 @@ def _claims(script: Script, both: tuple[Case, Case], where: str) -> list[Stateme
         (case, [script.symbol(case.name(n)) for n in case.numbers]) for case in both
     )
     claims = [
-        unchanged(old[0].name(n), n, old, new, is_strict=is_strict)
+        agreement(old[0].name(n), n, old, new, is_strict=is_strict)
         for is_strict in (True, False)
         for n in old[0].numbers
     ]

@@ -42,7 +42,7 @@ def is_plain(side: Side | None) -> bool:
     )
 
 
-def listed(side: Side | None) -> list[Fraction]:
+def side_values(side: Side | None) -> list[Fraction]:
     """Return the values of a side one by one, ascending; none of numbers or of many."""
     if side is None or not (side.values or side.is_whole):
         return []

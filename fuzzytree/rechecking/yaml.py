@@ -200,7 +200,7 @@ class _Reader:
 
     def _scalar(self, text: str) -> str | int | float:
         if text[:1] in ("'", '"'):
-            return self._unquoted(text)
+            return self._unquote(text)
         if text in _INFINITE:  # an open end of a trapezoid; no number elsewhere
             return _INFINITE[text]
         if _ALIEN.fullmatch(text):
@@ -211,15 +211,15 @@ class _Reader:
             return int(text)
         return float(text) if _NUMBER.fullmatch(text) else text
 
-    def _unquoted(self, text: str) -> str:
+    def _unquote(self, text: str) -> str:
         whole = _QUOTED.fullmatch(text)
         if whole is None:
             self.fail(f"a quote that does not end: {text[:40]!r}")
         if whole[2] is None:
             return whole[1].replace("''", "'")
-        return _ESCAPE.sub(self._escaped, whole[2])
+        return _ESCAPE.sub(self._unescape, whole[2])
 
-    def _escaped(self, result: re.Match[str]) -> str:
+    def _unescape(self, result: re.Match[str]) -> str:
         code = result[1]
         number = int(code[1:], 16) if len(code) > 1 else -1
         if number > 0x10FFFF or 0xD800 <= number < 0xE000:

@@ -16,7 +16,7 @@ from fuzzytree.rechecking import CannotRunError, records, sentences
 from fuzzytree.rechecking.case import strengths
 from fuzzytree.rechecking.curves import bounds, is_straight, turns
 from fuzzytree.rechecking.models import Model
-from fuzzytree.rechecking.records import built, read_json
+from fuzzytree.rechecking.records import decode, read_json
 from fuzzytree.rechecking.yaml import read_yaml
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.programs.operations import Doubles
@@ -108,7 +108,7 @@ def test_a_state_that_is_none_is_one_sentence(
     facts: dict[str, object], sentence: str
 ) -> None:
     with pytest.raises(CannotRunError) as caught:
-        built(records.State, facts, "it")
+        decode(records.State, facts, "it")
     assert str(caught.value) == sentence
 
 

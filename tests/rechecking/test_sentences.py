@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.rechecking.sentences import MESSAGES, rendered, shown
+from fuzzytree.rechecking.sentences import MESSAGES, express, render
 
 
 def test_every_message_is_of_a_code_and_graded_as_its_code_can_be() -> None:
@@ -52,7 +52,7 @@ def test_every_code_but_of_declining_has_a_message() -> None:
 def test_a_fact_is_shown_as_the_template_says(
     fact: object, how: str, text: str
 ) -> None:
-    assert shown(fact, how) == text  # type: ignore[arg-type] # of any kind
+    assert express(fact, how) == text  # type: ignore[arg-type] # of any kind
 
 
 @pytest.mark.parametrize(
@@ -60,20 +60,20 @@ def test_a_fact_is_shown_as_the_template_says(
 )
 def test_a_fact_of_another_kind_is_refused(fact: object, how: str) -> None:
     with pytest.raises(ValueError, match=f"shown as {how!r}"):
-        shown(fact, how)  # type: ignore[arg-type] # of another kind
+        express(fact, how)  # type: ignore[arg-type] # of another kind
 
 
 def test_a_part_is_left_out_without_its_fact() -> None:
     facts: dict[str, str | float]
     facts = {"subject": "rule 1 and rule 2", "level": 0.5, "then": "a", "other": "b"}
-    text = rendered("FT201.conflict", facts)
+    text = render("FT201.conflict", facts)
     assert text == (
         "rule 1 and rule 2 conflict: both reach 0.5 at one input, and say 'a' and 'b'"
     )
-    short = rendered("FT201.conflict", {**facts, "falls short": 1e-9})
+    short = render("FT201.conflict", {**facts, "falls short": 1e-9})
     assert short == text.replace("reach", "reach nearly")
 
 
 def test_a_message_without_its_facts_is_refused() -> None:
     with pytest.raises(KeyError, match="terms in use"):
-        rendered("FT404.used", {"variables in use": 1})
+        render("FT404.used", {"variables in use": 1})

@@ -42,7 +42,7 @@ from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import sampled_share
 from fuzzytree.model import BoolArray, FloatArray, FuzzyTree, RuleBase
 from fuzzytree.numerics import decide
-from fuzzytree.rechecking import listed, open_interval
+from fuzzytree.rechecking import open_interval, side_values
 
 MOST_BOXES: Final = 20_000
 """Boxes of all leaves together, beyond which a tree's regions are not looked at."""
@@ -151,8 +151,8 @@ def share_of(box: Domain, tree: FuzzyTree, domain: Domain) -> float | None:
         whole = domain.side(side.variable)
         if whole is None or side.variable not in tree.inputs:
             return None
-        if values := listed(whole):
-            share *= Fraction(len(listed(side) or side.values), len(values))
+        if values := side_values(whole):
+            share *= Fraction(len(side_values(side) or side.values), len(values))
         elif whole.low < whole.high:
             width = Fraction(whole.high) - Fraction(whole.low)
             share *= (Fraction(side.high) - Fraction(side.low)) / width

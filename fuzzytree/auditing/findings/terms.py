@@ -40,7 +40,7 @@ from fuzzytree.model import (
     questions,
 )
 from fuzzytree.numerics import exact_degree, outwards
-from fuzzytree.rechecking import listed
+from fuzzytree.rechecking import side_values
 
 _NEAR: Final = Fraction(1, 10**9)  # bounds of a height that are shown as one number
 _INEXACT: Final = "curves are known between functions of lines"
@@ -99,7 +99,7 @@ def ranges(subject: Subject) -> tuple[VariableRange, ...]:
         if terms:
             variable = replace(variable, terms=tuple(terms))
             is_open = side is not None and side.is_open and low == side.low < high
-            row = variable, low, high, curves, is_open, listed(side)
+            row = variable, low, high, curves, is_open, side_values(side)
             result.append(VariableRange(*row))
     return tuple(result)
 
