@@ -31,7 +31,9 @@ FILES: Final[Mapping[str, str]] = MappingProxyType(
         "learn.schema.json": "fuzzytree.api.holdout:Summary",
         "needs.schema.json": "fuzzytree.benchmarking.savings:Footprint",
         "require.schema.json": "fuzzytree.auditing.require.claims:Compliance",
-        "requirements.schema.json": "fuzzytree.auditing.require.phrases:RequirementsFile",
+        "requirements.schema.json": (
+            "fuzzytree.auditing.require.phrases:RequirementsFile"
+        ),
         "rulebase.schema.json": "fuzzytree.formats.yaml.layout:RuleBaseFile",
         "stability.schema.json": "fuzzytree.checking.stability.results:Stability",
         "system.schema.json": "fuzzytree.formats.yaml.layout:SystemFile",
