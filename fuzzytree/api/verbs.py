@@ -569,7 +569,7 @@ def audit(
     )
     return auditing.audit(
         model,
-        domain=auditing.limited(box, where.limits, model.model),
+        domain=auditing.limit_domain(box, where.limits, model.model),
         row=row or None,
         selection=selection,
         settings=chosen,
@@ -823,7 +823,7 @@ def require(
     return auditing.comply(
         document,
         claims,
-        auditing.limited(domain, ends, document),
+        auditing.limit_domain(domain, ends, document),
         steps=auditing.STEPS if steps is None else steps,
         title=str(file.name) if file else "",
         source=source,

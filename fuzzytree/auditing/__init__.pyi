@@ -35,7 +35,7 @@ from .findings.configuration import settings_with as settings_with
 from .findings.domains import AuditDomain as AuditDomain
 from .findings.domains import Limits as Limits
 from .findings.domains import domain_of as domain_of
-from .findings.domains import limited as limited
+from .findings.domains import limit_domain as limit_domain
 from .findings.domains import read_value as read_value
 from .findings.locations import ModelFile as ModelFile
 from .findings.locations import model_file as model_file
@@ -50,9 +50,9 @@ from .findings.records import Severity as Severity
 from .findings.records import SourceFile as SourceFile
 from .findings.records import VerbResult as VerbResult
 from .findings.results import baseline_of as baseline_of
+from .findings.results import obsolete_ids as obsolete_ids
 from .findings.results import read_baseline as read_baseline
 from .findings.results import read_results as read_results
-from .findings.results import resolved_ids as resolved_ids
 from .findings.subject import AuditRows as AuditRows
 from .findings.subject import AuditView as AuditView
 from .findings.subject import Material as Material

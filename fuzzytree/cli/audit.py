@@ -155,8 +155,8 @@ def command(options: AuditOptions) -> int:
         AuditDomain,
         AuditSelection,
         baseline_of,
+        obsolete_ids,
         read_baseline,
-        resolved_ids,
         smt_text,
     )
     from fuzzytree.report import audit_lines, audit_verdict
@@ -201,7 +201,7 @@ def command(options: AuditOptions) -> int:
         )
     form: Form | Literal["json"] = "json" if options.as_json else options.form
     known_ids = accepted if path else None
-    lost = [*resolved_ids(accepted, found)]
+    lost = [*obsolete_ids(accepted, found)]
     if form == "text":
         text = "\n".join(
             audit_lines(

@@ -17,7 +17,7 @@ from fuzzytree.auditing import (
     Declined,
     FileLocation,
     Severity,
-    resolved_ids,
+    obsolete_ids,
 )
 from fuzzytree.model import printable
 from fuzzytree.report.audit_states import SEVERITIES, as_in_file, state_text, state_word
@@ -129,7 +129,7 @@ def _absent(
     audit: Audit, baseline: Mapping[str, str], codes: list[str]
 ) -> Iterator[_Json]:
     """Yield accepted findings that are no longer there."""
-    for name in resolved_ids(baseline, audit):
+    for name in obsolete_ids(baseline, audit):
         code = name.partition("-")[0]
         if code in codes:
             yield {

@@ -34,7 +34,7 @@ from fuzzytree.auditing.diff.samples import Differences, Pair, Progress, left_ou
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, FactValue
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.auditing.findings.support import sampled_share
+from fuzzytree.auditing.findings.support import share_in_sample
 from fuzzytree.model import FloatArray, RuleBase
 from fuzzytree.numerics import MISSING, TIE, UNCOVERED, decide
 from fuzzytree.semantics import probe_values, proof_faults, unguarded
@@ -80,7 +80,7 @@ def class_answers(
     if count and not is_equal:
         how = f"{count} points drawn evenly from the domain, seed {settings.seed}"
         of = "the domain that is classified differently"
-        state, is_finding = sampled_share(of, many, count, how), many > 0
+        state, is_finding = share_in_sample(of, many, count, how), many > 0
         answer = audit_answer("FT801.domain", "domain", state, is_finding=is_finding)
         answers.append(answer)
     if differences.left and not is_equal:
@@ -104,7 +104,7 @@ def _on_rows(rows: AuditRows, differences: _Decisions, budget: Budget) -> AuditA
     hits, count = differences.add(rows.values, budget, "row")
     total = rows.values.shape[1]
     of = "rows that are classified differently"
-    state = sampled_share(of, hits, count, rows.name)
+    state = share_in_sample(of, hits, count, rows.name)
     facts: dict[str, FactValue] = {"table": rows.name}
     if count < total:
         facts["total"] = total

@@ -19,7 +19,7 @@ from fuzzytree.auditing.diff.samples import (
 )
 from fuzzytree.auditing.diff.structure import Structure
 from fuzzytree.auditing.findings.audit import source_of, with_confirmations
-from fuzzytree.auditing.findings.domains import Limits, Words, domain_of, limited
+from fuzzytree.auditing.findings.domains import Limits, Words, domain_of, limit_domain
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
@@ -93,7 +93,7 @@ def joined_domain(
                 )
     domain = Domain(tuple(sides.values()))
     if limits:
-        domain = limited(domain, limits, union(old, new))
+        domain = limit_domain(domain, limits, union(old, new))
     ends = {side.variable: side for side in domain.sides}
     return Domain(tuple(ends[name] for name in inputs))
 

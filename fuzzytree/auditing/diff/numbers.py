@@ -40,7 +40,7 @@ from fuzzytree.auditing.findings.records import (
     Measure,
 )
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.auditing.findings.support import sampled_share
+from fuzzytree.auditing.findings.support import share_in_sample
 from fuzzytree.model import (
     FloatArray,
     Formula,
@@ -195,7 +195,7 @@ def _sampled(
         if not count:
             continue
         of = "rows in which an output differs"
-        state = sampled_share(of, hits, count, f"{count} {how}")
+        state = share_in_sample(of, hits, count, f"{count} {how}")
         facts: dict[str, FactValue] = {"from": how}
         if not hits and differences.rounding:
             facts["rounding"] = differences.rounding

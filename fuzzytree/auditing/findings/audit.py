@@ -23,7 +23,7 @@ from fuzzytree.auditing.findings.codes import (
     Family,
     audit_answer,
 )
-from fuzzytree.auditing.findings.configuration import check_settings, chosen_codes
+from fuzzytree.auditing.findings.configuration import check_settings, code_selection
 from fuzzytree.auditing.findings.domains import Words, domain_of
 from fuzzytree.auditing.findings.locations import (
     ModelFile,
@@ -85,7 +85,7 @@ def audit(
     model, rows, file = material.model, material.rows, material.file
     selection, settings = selection or AuditSelection(), settings or AuditSettings()
     check_settings(settings)
-    wanted = chosen_codes(selection.select, selection.skip)
+    wanted = code_selection(selection.select, selection.skip)
     if row is not None:
         _check_row(row, model.inputs)
     viewed = view(model, domain or domain_of(model))
@@ -105,7 +105,7 @@ def audit(
     is_plain = [*viewed.numbers] == [*range(1, len(viewed.numbers) + 1)]
     words = Words(viewed.domain, model.variables)
     kept = sorted((a for a in answers if a.code in wanted), key=lambda a: a.code)
-    located = _located(map(words.answer, kept), viewed, material, repeat)
+    located = _with_places(map(words.answer, kept), viewed, material, repeat)
     result = Audit(
         version=version(),
         model=model.name,
@@ -118,7 +118,7 @@ def audit(
         domain=words.domain,
         settings=settings,
         answers=tuple(located),
-        unasked=tuple(_unasked(viewed.policy, wanted, answers, cut, reasons)),
+        unasked=tuple(_omissions(viewed.policy, wanted, answers, cut, reasons)),
         limits=LIMITS,
         is_complete=not cut,
         results=tuple(loaded.result for loaded in material.results),
@@ -126,7 +126,7 @@ def audit(
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
-    subject_model = _audited(viewed, model)
+    subject_model = _model_of_answers(viewed, model)
     own_file = file if subject_model is model else None
     confirmed, why = with_confirmations(
         result.answers, lambda: confirm(*_for_solver(result, subject_model, own_file))
@@ -145,13 +145,13 @@ def smt_text(result: Audit, model: Document) -> str:
     """Return a model and what is PROVED of it as SMT-LIB 2, for any solver."""
     try:
         return claims_text(
-            *_for_solver(result, _audited(view(model, result.domain), model))
+            *_for_solver(result, _model_of_answers(view(model, result.domain), model))
         )
     except CannotRunError as error:
         raise ReadError(str(error)) from error
 
 
-def _audited(viewed: AuditView, model: Document) -> Document:
+def _model_of_answers(viewed: AuditView, model: Document) -> Document:
     """Return what answers are about: the rules for which a system may stand."""
     is_class = viewed.policy.decision == "strongest" and model is viewed.system
     return viewed.rules if is_class and viewed.rules is not None else model
@@ -175,7 +175,7 @@ def with_confirmations(
 
     What it refutes is left out, and FT901 stands in its place.
     """
-    if not any(isinstance(one.state, Proved) for one in answers):
+    if not any(isinstance(answer.state, Proved) for answer in answers):
         return (*answers,), ""
     try:
         report = confirmation()
@@ -267,7 +267,7 @@ def family_answers(family: Family, subject: Subject) -> Iterator[AuditAnswer]:
     yield from getattr(place, name)(subject)
 
 
-def _unasked(
+def _omissions(
     policy: Policy,
     wanted: Collection[str],
     answers: Sequence[AuditAnswer],
@@ -297,7 +297,7 @@ def _unasked(
             yield f"{name}: nothing in this model that it applies to"
 
 
-def _located(
+def _with_places(
     answers: Iterable[AuditAnswer], viewed: AuditView, material: Material, repeat: str
 ) -> Iterator[AuditAnswer]:
     """Yield answers with ids, places and the commands that repeat them."""

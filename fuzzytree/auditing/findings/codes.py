@@ -46,7 +46,7 @@ def _codes() -> Mapping[str, Code]:
     """Return the codes of the file beside this module, in its order."""
     folder = resources.files("fuzzytree.auditing.findings")
     entries = tomllib.loads(folder.joinpath("codes.toml").read_text("utf-8")).items()
-    return {name: msgspec.convert({"code": name, **one}, Code) for name, one in entries}
+    return {name: msgspec.convert({"code": name, **of}, Code) for name, of in entries}
 
 
 CODES: Final = MappingProxyType(_codes())

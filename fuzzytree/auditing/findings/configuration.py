@@ -40,7 +40,7 @@ _COUNTS: Mapping[str, tuple[int, int]] = {
 }
 
 
-def chosen_codes(select: Sequence[str] = (), skip: Sequence[str] = ()) -> set[str]:
+def code_selection(select: Sequence[str] = (), skip: Sequence[str] = ()) -> set[str]:
     """Return the selected codes, and all reasons for declining.
 
     The reasons are always included: without them the other answers seem to be about
@@ -189,6 +189,6 @@ def _wrong(bound: Configuration) -> Iterator[tuple[Path, str]]:
     for key in ("select", "skip"):
         for position, text in enumerate(getattr(bound, key)):
             try:
-                chosen_codes([text])
+                code_selection([text])
             except ValueError as error:
                 yield (key, position), str(error)

@@ -38,14 +38,14 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     if subject.base.is_empty:
         return
     if subject.policy.decision == "all":
-        yield from _firing(subject)
+        yield from _rules_that_fire(subject)
         return
-    yield from _winning(subject)
-    yield from _needed(subject)
+    yield from _rules_that_win(subject)
+    yield from _rules_that_matter(subject)
     yield from _ties(subject)
 
 
-def _firing(subject: Subject) -> Iterator[AuditAnswer]:
+def _rules_that_fire(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer whether each rule fires; a rule of several ways, whether one of them."""
     ways: dict[str, list[int]] = {}
     for place in range(subject.base.count):
@@ -65,7 +65,7 @@ def _firing(subject: Subject) -> Iterator[AuditAnswer]:
             yield subject.answer(message, places[:1], state)
 
 
-def _winning(subject: Subject) -> Iterator[AuditAnswer]:
+def _rules_that_win(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer whether each rule wins, and if it does whether by enough."""
     count = subject.base.count
     for place in range(count):
@@ -151,7 +151,7 @@ def _lead(subject: Subject, place: int) -> AuditAnswer:
     )
 
 
-def _needed(subject: Subject) -> Iterator[AuditAnswer]:
+def _rules_that_matter(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer whether leaving out a rule changes a decision."""
     base = subject.base
     for place in range(base.count if base.count > 1 else 0):
@@ -281,11 +281,11 @@ def _gaps(subject: Subject, first: Point) -> Iterator[AuditAnswer]:
     rows: list[tuple[Fraction, int]] = []
     if subject.rows is not None:
         variables = subject.rules.variables
-        known = [
+        gaps = [
             sides or {name: (x, x) for name, x in point.values.items()}
             for sides, point in zip(boxes, points, strict=True)
         ]
-        rows = nearest_rows(known, subject.rows, subject.domain, variables)
+        rows = nearest_rows(gaps, subject.rows, subject.domain, variables)
         order.sort(key=lambda place: rows[place][0] if rows else 0)
     for number, place in enumerate(order, 1):
         state = _below(subject, points[place], Fraction(0), boxes[place])

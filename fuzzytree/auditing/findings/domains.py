@@ -80,7 +80,7 @@ def domain_of(
     if within == "data" and spreads is None and rows is None:
         raise ValueError("limits from data need rows (--data TABLE)")
     curves = _curves(model)
-    queried = _queried(model, curves)
+    queried = _inputs_in_use(model, curves)
     sides: list[DomainSide] = []
     faults: list[str] = []
     inputs = [variable for variable in model.variables if not variable.parts]
@@ -98,7 +98,7 @@ def domain_of(
             elif within == "data":
                 side = _data_side(axis, finite)
             else:
-                side = _declared_side(axis, curves[name], values, finite)
+                side = _default_side(axis, curves[name], values, finite)
         except ValueError as error:
             if name in queried:
                 faults.append(str(error))
@@ -123,7 +123,7 @@ def _curves(model: Document) -> dict[str, list[Curve]]:
     return curves
 
 
-def _queried(model: Document, curves: Mapping[str, Sequence[Curve]]) -> set[str]:
+def _inputs_in_use(model: Document, curves: Mapping[str, Sequence[Curve]]) -> set[str]:
     """Return the inputs on which something may depend."""
     every = itertools.chain.from_iterable(curves.values())
     if any(isinstance(curve, Formula | Linear) for curve in every):
@@ -135,7 +135,7 @@ def _queried(model: Document, curves: Mapping[str, Sequence[Curve]]) -> set[str]
     return queried
 
 
-def limited(domain: Domain, limits: Limits, model: Document) -> Domain:
+def limit_domain(domain: Domain, limits: Limits, model: Document) -> Domain:
     """Return a domain with other ends for some variables.
 
     A stand-in for missing values stays where it lies between the ends, or is named.
@@ -149,11 +149,11 @@ def limited(domain: Domain, limits: Limits, model: Document) -> Domain:
     sides = {side.variable: side for side in domain.sides}
     for variable in model.variables:
         if variable.name in limits:
-            sides[variable.name] = _limited_side(variable, limits[variable.name])
+            sides[variable.name] = _side_within(variable, limits[variable.name])
     return Domain(tuple(sides[name] for name in names if name in sides))
 
 
-def _limited_side(variable: Variable, limits: tuple[float, float] | str) -> DomainSide:
+def _side_within(variable: Variable, limits: tuple[float, float] | str) -> DomainSide:
     """Return the values of a variable within limits."""
     name, missing = variable.name, variable.missing
     if variable.categories:
@@ -206,7 +206,7 @@ def _with_values(
     return whole_side(side) if axis.is_whole else side
 
 
-def _declared_side(
+def _default_side(
     axis: Variable,
     curves: Sequence[Curve],
     values: FloatArray | None,
@@ -251,8 +251,8 @@ def _spread_side(
 ) -> DomainSide:
     """Return some spreads around the sets of an input, or around the mean of rows."""
     sets = [curve for curve in curves if isinstance(curve, LR)]
-    ends = [one.mean - spreads * one.left.spread for one in sets]
-    ends += [one.mean + spreads * one.right.spread for one in sets]
+    ends = [curve.mean - spreads * curve.left.spread for curve in sets]
+    ends += [curve.mean + spreads * curve.right.spread for curve in sets]
     if not ends and finite.size:
         mean, spread = float(np.mean(finite)), float(np.std(finite))
         ends = [mean - spreads * spread, mean + spreads * spread]
@@ -279,7 +279,7 @@ class Words:
     """The inputs of a model on a domain, as their table has them."""
 
     def __init__(self, domain: Domain, variables: Iterable[Variable]) -> None:
-        self._columns = {one.name: one for one in variables if not one.parts}
+        self._columns = {v.name: v for v in variables if not v.parts}
         self._sides = {side.variable: side for side in domain.sides}
 
     @property
@@ -287,7 +287,7 @@ class Words:
         """The domain with its words."""
         spans = {name: self.span(Span(name, None, None)) for name in self._sides}
         sides = self._sides.items()
-        return Domain(tuple(replace(one, word=spans[name].word) for name, one in sides))
+        return Domain(tuple(replace(s, word=spans[name].word) for name, s in sides))
 
     def value(self, name: str, value: Fraction) -> str:
         """Return a value of an input in words; empty of a number with a fraction."""
@@ -338,8 +338,8 @@ class Words:
         answer = replace(answer, state=state, region=region, facts=facts)
         return replace(answer, sentence=sentence_of(answer))
 
-    def _coordinate(self, one: Coordinate) -> Coordinate:
-        return replace(one, word=self.value(one.input, Fraction(one.exact)))
+    def _coordinate(self, at: Coordinate) -> Coordinate:
+        return replace(at, word=self.value(at.input, Fraction(at.exact)))
 
 
 def read_value(variable: Variable, text: str) -> float:
@@ -351,10 +351,10 @@ def read_value(variable: Variable, text: str) -> float:
     value: float | None
     if variable.categories:
         value = placer(variable.categories)(text)
-        known = f"one of {', '.join(map(repr, variable.categories[:20]))}"
+        allowed = f"one of {', '.join(map(repr, variable.categories[:20]))}"
     else:
         days = days_of(text) if variable.unit == DATE_UNIT else None
-        known = (
+        allowed = (
             "a date such as 2024-03-01" if variable.unit == DATE_UNIT else "a number"
         )
         try:
@@ -366,5 +366,5 @@ def read_value(variable: Variable, text: str) -> float:
     if is_missing and variable.missing is not None:
         return variable.missing
     if value is None or is_missing or math.isnan(value):
-        raise ValueError(f"{variable.name!r} cannot be {text!r}; it is {known}")
+        raise ValueError(f"{variable.name!r} cannot be {text!r}; it is {allowed}")
     return value

@@ -39,7 +39,7 @@ from fuzzytree.auditing.decide.states import (
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.support import sampled_share
+from fuzzytree.auditing.findings.support import share_in_sample
 from fuzzytree.model import BoolArray, FloatArray, FuzzyTree, RuleBase
 from fuzzytree.numerics import decide
 from fuzzytree.rechecking import open_interval, side_values
@@ -72,7 +72,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
         places = [(box, point_in(box, tree)) for box in inside]
         parts = [(box, point) for box, point in places if point is not None]
         if not parts:
-            yield _unreached(subject, tree, region, len(inside))
+            yield _dead_leaf(subject, tree, region, len(inside))
             continue
         live += 1
         for number, (box, point) in enumerate(parts if count <= MOST_LISTED else (), 1):
@@ -159,7 +159,7 @@ def share_of(box: Domain, tree: FuzzyTree, domain: Domain) -> float | None:
     return float(share)
 
 
-def _unreached(
+def _dead_leaf(
     subject: Subject, tree: FuzzyTree, region: Region, count: int
 ) -> AuditAnswer:
     """Return that no input reaches a leaf, and why."""
@@ -209,7 +209,7 @@ class TreeAndRules:
             self.domain, self.tree.variables, point
         )
 
-    def differing(self, values: FloatArray) -> BoolArray:
+    def rows_that_differ(self, values: FloatArray) -> BoolArray:
         """Return on which complete rows both differ, exactly; shape (rows,)."""
         own = [leaf.label for leaf in self.tree.leaves]
         other = [self.raw.semantics.uncovered, *(rule.then for rule in self.raw.rules)]
@@ -279,7 +279,7 @@ def raw_answers(subject: Subject) -> Iterator[AuditAnswer]:
         if isinstance(state, Proved):
             alike += 1
         elif isinstance(state, Witness):
-            point = {one.input: Fraction(one.exact) for one in state.point}
+            point = {at.input: Fraction(at.exact) for at in state.point}
             other, place = decided(both.base, point)
             if place is not None and place + 1 != leaf:
                 rules.append(place + 1)
@@ -297,6 +297,7 @@ def raw_answers(subject: Subject) -> Iterator[AuditAnswer]:
         values = subject.rows.values[:, np.isfinite(subject.rows.values).all(axis=0)]
         if values.shape[1]:
             what = "rows that raw rules decide differently"
-            hits, of = int(both.differing(values).sum()), f"rows of {subject.rows.name}"
-            state = sampled_share(what, hits, values.shape[1], of)
+            hits = int(both.rows_that_differ(values).sum())
+            of = f"rows of {subject.rows.name}"
+            state = share_in_sample(what, hits, values.shape[1], of)
             yield audit_answer("FT203.rows", "rows", state)

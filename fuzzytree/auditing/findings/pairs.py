@@ -49,7 +49,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer what is to be said of pairs of rules, and of single propositions."""
     if subject.base.is_empty:
         return
-    yield from _hidden(subject)
+    yield from _dominance(subject)
     yield from _copies(subject)
     if subject.rules.kind != "relative":
         yield from _conflicts(subject)
@@ -74,7 +74,7 @@ def _facts(subject: Subject, pair: Pair) -> dict[str, FactValue]:
 # --- FT104 and FT105: is one rule at least as strong everywhere?
 
 
-def _hidden(subject: Subject) -> Iterator[AuditAnswer]:
+def _dominance(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer which rules another one hides, of their class (FT104) or not (FT105)."""
     claims, budget, rules = subject.claims, subject.budget, subject.base.rules
     budget.report("subsumed rule", 0.0)

@@ -213,8 +213,8 @@ class Audit(Value, frozen=True):
     @property
     def open_findings(self) -> tuple[AuditAnswer, ...]:
         """The findings that no baseline accepts."""
-        known = set(self.accepted)
-        return tuple(answer for answer in self.findings if answer.id not in known)
+        accepted = set(self.accepted)
+        return tuple(answer for answer in self.findings if answer.id not in accepted)
 
     def __repr__(self) -> str:
         """Show how many answers there are, and how many of them are findings."""

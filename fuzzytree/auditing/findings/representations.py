@@ -21,7 +21,7 @@ from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import (
     rows_outside,
     sample_points,
-    sampled_share,
+    share_in_sample,
 )
 from fuzzytree.checking import check
 from fuzzytree.model import Agreement, Certified, Comparison, Dtype, Model, Variable
@@ -61,7 +61,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     for certified in result.agreement.certificates:
         subject.budget.check()
         form = models[certified.representation.rpartition(" in ")[0]]
-        yield from _certified(subject, certified, form, how)
+        yield from _error_bound(subject, certified, form, how)
 
 
 def _model(subject: Subject) -> Model:
@@ -204,7 +204,7 @@ def _conventions(subject: Subject, values: FloatArray) -> dict[str, Sequence[int
 # --- what a number type can change
 
 
-def _certified(
+def _error_bound(
     subject: Subject, certified: Certified, form: Model, how: str
 ) -> Iterator[AuditAnswer]:
     """Yield the bound of a number type's error, and where it leaves a class open."""
@@ -228,7 +228,7 @@ def _certified(
     if certified.on == "data" and certified.rows:
         noun = "rows" if subject.rows is not None else "points"
         of, hits = f"{noun} within the band of {name}", certified.in_band
-        state = sampled_share(of, hits, certified.rows, how)
+        state = share_in_sample(of, hits, certified.rows, how)
         facts = {"representation": name, "noun": noun}
         yield audit_answer("FT601.band", f"{name}, its band", state, facts=facts)
 

@@ -45,7 +45,7 @@ def read_baseline(path: PathLike) -> Mapping[str, str]:
         content = read_bounded(path, _MOST_BYTES)
         accepted = msgspec.json.decode(content, type=Baseline).accepted
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ReadError(f"{lead}: {_quoted(error)}") from error
+        raise ReadError(f"{lead}: {_error_text(error)}") from error
     for name in accepted:
         if not _ID.fullmatch(name):
             raise ReadError(f"{lead}: {name[:40]!r} is no id of a finding")
@@ -59,7 +59,7 @@ def baseline_of(audit: Audit) -> bytes:
     return (json.dumps(facts, indent=2, ensure_ascii=False) + "\n").encode()
 
 
-def resolved_ids(baseline: Mapping[str, str], audit: Audit) -> Iterator[str]:
+def obsolete_ids(baseline: Mapping[str, str], audit: Audit) -> Iterator[str]:
     """Yield the accepted ids that an audit no longer finds, in order.
 
     Codes that were not run, or were cut short, are left out.
@@ -93,7 +93,7 @@ def read_results(
     for path in paths:
         name = os.fspath(path)
         content = read_bounded(path, _MOST_BYTES)
-        record = _decoded(content, name)
+        record = _read_record(content, name)
         file = SourceFile(writable(name), hashlib.sha256(content).hexdigest())
         result = _result(record, file)
         wanted = fingerprint(model)
@@ -121,7 +121,7 @@ def _result(record: Agreement | Stability, file: SourceFile) -> VerbResult:
     return VerbResult("stability", file, len(verdicts), verdicts.count("FAILS"))
 
 
-def _decoded(content: bytes, name: str) -> Agreement | Stability:
+def _read_record(content: bytes, name: str) -> Agreement | Stability:
     """Return the record in a file, which must be as this version wrote it."""
     from fuzzytree.checking import Stability  # which few audits need
 
@@ -131,7 +131,7 @@ def _decoded(content: bytes, name: str) -> Agreement | Stability:
     try:
         facts = msgspec.json.decode(content, type=dict[str, object])
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ReadError(f"{lead}: {_quoted(error)}") from error
+        raise ReadError(f"{lead}: {_error_text(error)}") from error
     form, made_by = facts.get("format"), facts.get("version")
     kind = kinds.get(form) if isinstance(form, str) else None
     if kind is None:
@@ -144,13 +144,13 @@ def _decoded(content: bytes, name: str) -> Agreement | Stability:
     try:
         record = msgspec.convert(_whole(facts, inspect.type_info(kind)), kind)
     except msgspec.ValidationError as error:
-        raise ReadError(f"{lead}: {_quoted(error)}") from error
+        raise ReadError(f"{lead}: {_error_text(error)}") from error
     if msgspec.json.decode(record.to_json()) != facts:
         raise ReadError(f"{lead}: what it says does not fit together")
     return record
 
 
-def _quoted(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     return str(error).replace("`", "'")
 
 

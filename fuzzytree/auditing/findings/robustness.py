@@ -61,7 +61,7 @@ class RowDecider:
         else:
             self.base = Base.of(subject.rules, subject.domain)
 
-    def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
+    def decision(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
         """Return the class at a point, and the leaf or the rule that decides."""
         if isinstance(self.base, Leaves):
             label, leaf = self.base.decided(point)
@@ -77,7 +77,7 @@ def row_answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Yield how a row is decided, and how far the nearest other decision is."""
     if subject.row is None:
         return
-    declined = _declined(subject)
+    declined = _refusal(subject)
     if declined is not None:
         yield audit_answer("FT204.not-sought", "row", declined)
         return
@@ -92,14 +92,14 @@ def row_answers(subject: Subject) -> Iterator[AuditAnswer]:
                 f"widen it (--limits '{variable.name}=LOW:HIGH')"
             )
     decider = RowDecider(subject)
-    label, by = decider.decided(point)
+    label, by = decider.decision(point)
     state = Witness(coordinates(point), (Claim("decides", of=decider.of, label=label),))
     yield audit_answer("FT204.decided", "row", state, facts={"then": label, "by": by})
     result = nearest(decider.base, point, budget=subject.budget)
     yield _radius(decider, "the row", point, result)
 
 
-def _declined(subject: Subject) -> Declined | None:
+def _refusal(subject: Subject) -> Declined | None:
     """Return why rows of a model are declined, None if they are not."""
     if subject.policy.decision != "strongest":
         why = "every rule takes part in the answer, so that no class decides"
@@ -113,7 +113,7 @@ def _radius(
     decider: RowDecider, name: str, point: Mapping[str, Fraction], result: Nearest
 ) -> AuditAnswer:
     """Return how far a point is from another decision."""
-    own, _ = decider.decided(point)
+    own, _ = decider.decision(point)
     facts: dict[str, FactValue] = {"name": name, "then": own}
     title = name.removeprefix("the ")
     what = f"the distance from {name} to another decision"
@@ -123,12 +123,12 @@ def _radius(
             return audit_answer("FT204.alike", title, proof, facts=facts)
         bracket = Bracket(what, outwards(result.low)[0], 1.0, result.why)
         return audit_answer("FT204.none-known", title, bracket, facts=facts)
-    other, _ = decider.decided(result.point)
+    other, _ = decider.decision(result.point)
     moved = [axis for axis, value in result.point.items() if value != point[axis]]
     near = simplified(
         {axis: result.point[axis] for axis in moved},
         decider.domain,
-        lambda some: decider.decided({**point, **some})[0] == other,
+        lambda some: decider.decision({**point, **some})[0] == other,
     )
     values = tuple((axis, repr(float(value))) for axis, value in near.items())
     facts |= {"other": other, "moved": values}
@@ -178,7 +178,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """
     if subject.policy.decision != "strongest":
         return
-    declined = _declined(subject)
+    declined = _refusal(subject)
     if declined is not None or subject.rows is None:
         needed = Declined("FTD06", "rows are needed (--data TABLE)")
         yield audit_answer("FT204.not-sought", "rows", declined or needed)

@@ -197,10 +197,10 @@ def subject_of(
 ) -> Subject:
     """Return the rules of a view, ready for questions."""
     is_class = viewed.policy.decision == "strongest" or viewed.system is None
-    asked = viewed.rules if is_class else viewed.system
-    if asked is None:
+    model = viewed.rules if is_class else viewed.system
+    if model is None:
         raise ValueError("there is no rule to audit")
-    variables = {variable.name: variable for variable in asked.variables}
+    variables = {variable.name: variable for variable in model.variables}
     base = Base(viewed.base_rules, variables, viewed.domain, seed=settings.seed)
     budget = budget or Budget(int(settings.budget * 1e6))
     pairs = Pairs(Claims(base, viewed.policy.uncovered))
@@ -250,7 +250,7 @@ def _of_rules(rules: RuleBase, domain: Domain) -> AuditView:
     policy = Policy(meant.conjunction, "strongest", meant.uncovered, meant.missing)
     every = rules_of(rules).rules
     return AuditView(
-        rules, every, policy, domain, numbers=tuple(one.number for one in every)
+        rules, every, policy, domain, numbers=tuple(rule.number for rule in every)
     )
 
 
@@ -280,15 +280,15 @@ def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
         if block.activation.method != "general":
             why = f"it is {block.activation.method!r}; only conditions are audited"
             name = f"the activation of block {position}"
-            answers.append(_declined("FTD07", name, why))
-    answers += (_declined(one.code, one.name, one.reason) for one in left.values())
+            answers.append(_refusal("FTD07", name, why))
+    answers += (_refusal(o.code, o.name, o.reason) for o in left.values())
     proof = Proved("read off the rule; no input was needed")
     answers += (
         audit_answer(f"FT101.{why}", name, proof) for name, _, why in every.silent
     )
     whens = [tuple(map(_readable, rule.when)) for rule in kept]
     terms = dict.fromkeys(
-        (one.variable, term) for when in whens for one in when for term in one.terms
+        (p.variable, term) for when in whens for p in when for term in p.terms
     )
     terms |= {(v.name, t.name): None for v in system.variables for t in v.terms}
     rules = None
@@ -297,7 +297,7 @@ def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
         rules = RuleBase(
             system.name,
             tuple(dict.fromkeys(rule.then for rule in kept)),
-            tuple(_named(one, shapes, terms) for one in system.variables),
+            tuple(_with_terms(v, shapes, terms) for v in system.variables),
             tuple(Rule(when, rule.then) for when, rule in pairs),
             Semantics(conjunction),
         )
@@ -310,7 +310,7 @@ def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
         rule_names=tuple(rule.name for rule in kept),
         numbers=tuple(rule.number for rule in kept),
         declined=tuple(answers),
-        left_out={one.name: one.number for one in left.values()}
+        left_out={o.name: o.number for o in left.values()}
         | {name: number for name, number, _ in every.silent},
         is_whole=not left,
         curves=curves,
@@ -330,7 +330,7 @@ def _conjunction(system: FuzzySystem) -> Conjunction:
 
 def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[AuditAnswer]]:
     """Return the domain within the ranges that inputs are moved into."""
-    clipped = {one.name: one for one in system.variables if one.clips and not one.parts}
+    clipped = {v.name: v for v in system.variables if v.clips and not v.parts}
     sides: list[DomainSide] = []
     answers: list[AuditAnswer] = []
     for side in domain.sides:
@@ -346,12 +346,12 @@ def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[AuditAnsw
                 f"values outside its range are moved to its ends, so its domain is "
                 f"from {low!r} to {high!r}"
             )
-            answers.append(_declined("FTD07", f"input {side.variable!r}", why))
+            answers.append(_refusal("FTD07", f"input {side.variable!r}", why))
         sides.append(replace(side, low=low, high=high))
     return Domain(tuple(sides)), answers
 
 
-def _declined(code: str, subject: str, reason: str) -> AuditAnswer:
+def _refusal(code: str, subject: str, reason: str) -> AuditAnswer:
     return audit_answer("FTD.left-out", subject, Declined(code, reason))
 
 
@@ -372,21 +372,21 @@ def _shape(term: Term) -> Shape | None:
     return Points(shape.values, degrees) if [*map(Fraction, degrees)] == exact else None
 
 
-def _readable(one: Proposition) -> Proposition:
+def _readable(p: Proposition) -> Proposition:
     """Return a proposition whose hedges are part of the name of its term."""
-    hedges = one.hedges[one.negated :]
-    terms = tuple(" ".join((*hedges, term)) for term in one.terms)
-    return Proposition(one.variable, terms, ("not",) if one.negated else ())
+    hedges = p.hedges[p.negated :]
+    terms = tuple(" ".join((*hedges, term)) for term in p.terms)
+    return Proposition(p.variable, terms, ("not",) if p.negated else ())
 
 
-def _named(one: Variable, shapes: dict[Name, Shape], names: Iterable[Name]) -> Variable:
+def _with_terms(
+    v: Variable, shapes: dict[Name, Shape], names: Iterable[Name]
+) -> Variable:
     """Return an input with some terms; a plateau stands for one without a shape."""
     terms = tuple(
-        Term(name, shapes.get((of, name), Band()))
-        for of, name in names
-        if of == one.name
+        Term(name, shapes.get((of, name), Band())) for of, name in names if of == v.name
     )
-    return Variable(one.name, terms, one.unit, one.low, one.high, one.parts)
+    return Variable(v.name, terms, v.unit, v.low, v.high, v.parts)
 
 
 def _curves(
@@ -421,7 +421,7 @@ def _of_terms(
     uses = Counter(
         key
         for rule in system.rules
-        for key in {(one.variable, one.term) for one in questions(rule.when)}
+        for key in {(p.variable, p.term) for p in questions(rule.when)}
     )
     every = [
         (variable, term) for variable in system.variables for term in variable.terms

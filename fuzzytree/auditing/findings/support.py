@@ -69,7 +69,7 @@ def wilson(hits: int, rows: int) -> tuple[float, float]:
     return low, 1.0 if hits == rows else min(middle + half, 1.0)
 
 
-def sampled_share(of: str, hits: int, rows: int, how: str) -> Sampled:
+def share_in_sample(of: str, hits: int, rows: int, how: str) -> Sampled:
     """Return a share that was counted in a sample, with its interval."""
     return Sampled(of, hits, rows, *wilson(hits, rows), CONFIDENCE, how)
 
@@ -81,18 +81,18 @@ def sample_points(rules: RuleBase, domain: Domain, rows: int, seed: int) -> Floa
     """
     chance = np.random.default_rng(seed)
     sides = {side.variable: side for side in domain.sides}
-    columns = [drawn_values(sides[name], chance.random(rows)) for name in rules.inputs]
+    columns = [values_at(sides[name], chance.random(rows)) for name in rules.inputs]
     table = np.array(columns).reshape(len(rules.inputs), rows)
     return table[:, ~rows_outside(rules, domain, table)]
 
 
-def drawn_values(side: DomainSide, shares: FloatArray) -> FloatArray:
+def values_at(side: DomainSide, shares: FloatArray) -> FloatArray:
     """Return values of rows, spread evenly as shares from 0 to 1 are.
 
     Example:
         >>> from fuzzytree.auditing.decide.domain import DomainSide
         >>> doors = DomainSide("doors", 1.0, 4.0, is_whole=True)
-        >>> drawn_values(doors, np.array([0.0, 0.3, 0.99])).tolist()
+        >>> values_at(doors, np.array([0.0, 0.3, 0.99])).tolist()
         [1.0, 2.0, 4.0]
     """
     if side.values:
@@ -106,7 +106,7 @@ def drawn_values(side: DomainSide, shares: FloatArray) -> FloatArray:
 def rows_outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArray:
     """Return which rows have a finite value beyond a side; combinations exactly."""
     beyond: BoolArray = np.zeros(values.shape[1], np.bool_)
-    known = np.isfinite(values).all(axis=0)
+    is_finite = np.isfinite(values).all(axis=0)
     for variable in rules.variables:
         side = domain.side(variable.name)
         if side is None:
@@ -122,7 +122,7 @@ def rows_outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArr
                 is_own |= x == side.missing
             beyond |= ~is_own
             continue
-        for row in np.flatnonzero(known & ~beyond).tolist():
+        for row in np.flatnonzero(is_finite & ~beyond).tolist():
             named = dict(zip(rules.inputs, values[:, row].tolist(), strict=True))
             beyond[row] = not side.low <= exact_axis(variable, named) <= side.high
     return beyond
@@ -147,10 +147,11 @@ class RuleCounts(NamedTuple):
 
 
 def _row_counts(
-    outside: BoolArray, known: BoolArray, **of_known: BoolArray
+    outside: BoolArray, complete: BoolArray, **others: BoolArray
 ) -> Counter[str]:
-    masks = {"all": known | True, "outside": outside, "missing": ~known, "known": known}
-    masks |= {name: known & mask for name, mask in of_known.items()}
+    masks = {"all": complete | True, "known": complete}
+    masks |= {"outside": outside, "missing": ~complete}
+    masks |= {name: complete & mask for name, mask in others.items()}
     return Counter({name: int(mask.sum()) for name, mask in masks.items()})
 
 
@@ -200,7 +201,7 @@ def _exact_parts(
     rules, settings = subject.rules, subject.settings
     assert decisions.strengths is not None  # the default
     best = decisions.strengths.max(axis=0)
-    fires, may_fire = _firing(rules, values)
+    fires, may_fire = _fire_bounds(rules, values)
     is_weak = best < settings.epsilon
     margin = decisions.margin.copy()
     is_open = (fires != may_fire).any(axis=0)
@@ -220,7 +221,7 @@ def _exact_parts(
     return fires, is_weak, margin
 
 
-def _firing(rules: RuleBase, values: FloatArray) -> tuple[BoolArray, BoolArray]:
+def _fire_bounds(rules: RuleBase, values: FloatArray) -> tuple[BoolArray, BoolArray]:
     """Return which rules are above 0 for sure, and which may be."""
     named = dict(zip(rules.inputs, values, strict=True))
     shapes = shapes_of(rules.variables)
@@ -250,14 +251,14 @@ def _system_counts(
     """
     base, level = subject.base.fine, subject.settings.epsilon
     outside = rows_outside(subject.rules, subject.domain, values)
-    known = np.asarray(~np.isnan(values).any(axis=0), np.bool_)
+    complete = np.asarray(~np.isnan(values).any(axis=0), np.bool_)
     columns = dict(zip(subject.rules.inputs, values, strict=True))
     sides = [base.in_doubles(columns, is_upper=is_upper) for is_upper in (False, True)]
     is_open = outside & np.isfinite(values).all(axis=0)
     low, high = (side if is_each else side.max(axis=0)[None] for side in sides)
     is_near = (low <= 0.0) & (high > 0.0)
     is_near |= (low <= level + _NEAR) & (high >= level - _NEAR)
-    is_open |= known & is_near.any(axis=0)
+    is_open |= complete & is_near.any(axis=0)
     for row in np.flatnonzero(is_open).tolist():
         subject.budget.check()
         point = {name: Fraction(float(x[row])) for name, x in columns.items()}
@@ -265,8 +266,8 @@ def _system_counts(
             side[:, row] = [_on_side(strength, level) for strength in exact]
     results: list[RuleCounts] = []
     for side in sides:
-        best, fired = side.max(axis=0), ((side > 0.0) & known).sum(axis=1)
-        rows = _row_counts(outside, known, uncovered=best <= 0.0, weak=best < level)
+        best, fired = side.max(axis=0), ((side > 0.0) & complete).sum(axis=1)
+        rows = _row_counts(outside, complete, uncovered=best <= 0.0, weak=best < level)
         results.append(RuleCounts(rows, fired))
     return results[0], results[1]
 
@@ -300,7 +301,7 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
         ("missing", "rows with a missing value"),
         ("outside", "rows outside the domain"),
     ):
-        state = sampled_share(name, counts[word], counts["all"], how)
+        state = share_in_sample(name, counts[word], counts["all"], how)
         is_finding = counts[word] > 0
         yield audit_answer(f"FT701.{word}", name, state, is_finding=is_finding)
     if not counts["known"]:
@@ -309,12 +310,12 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
         how += " without a missing value"
     yield from _shares(subject, (lower, most), "rows", how)
     for number in range(1, len(subject.rules.rules) + 1):
-        least, fired = (int(one.fired[number - 1]) for one in (lower, most))
+        least, fired = (int(of.fired[number - 1]) for of in (lower, most))
         if fired == least:
             yield _of_rule(subject, lower, number, how)
             continue
-        known = counts["known"]
-        why = f"it fires on {least} of {known} at least, and on {fired} at most"
+        total = counts["known"]
+        why = f"it fires on {least} of {total} at least, and on {fired} at most"
         declined, name = Declined("FTD02", why), subject.rule_name(number)
         yield audit_answer("FT701.rule-open", name, declined)
 
@@ -375,7 +376,7 @@ def _shares(
         yield audit_answer(
             f"FT701.{name}",
             f"{name} {noun}",
-            sampled_share(f"{name} {noun}", hits, total, how),
+            share_in_sample(f"{name} {noun}", hits, total, how),
             is_finding=hits > 0 and noun == "rows",
             facts={"noun": noun, **limits},
         )
@@ -389,18 +390,18 @@ def _of_rule(
     fired = int(counts.fired[number - 1])
     facts: dict[str, FactValue] = {"known": total}
     measures = [Measure("rows fired", fired)]
-    state = sampled_share(f"rows on which {name} fires", fired, total, how)
+    state = share_in_sample(f"rows on which {name} fires", fired, total, how)
     is_finding = not fired
     if counts.won is not None:
         won = int(counts.won[number - 1])
         is_finding = not won
         measures.append(Measure("rows won", won))
-        state = sampled_share(f"rows that {name} wins", won, total, how)
+        state = share_in_sample(f"rows that {name} wins", won, total, how)
         if counts.right is not None and won:
             right = int(counts.right[number - 1])
             measures.append(Measure("rows won rightly", right))
             of = f"rows that {name} wins and that have its class"
-            state = sampled_share(of, right, won, f"of {how}, those that it wins")
+            state = share_in_sample(of, right, won, f"of {how}, those that it wins")
             facts["then"] = subject.rules.rules[number - 1].then
     return audit_answer(
         "FT701.rule",

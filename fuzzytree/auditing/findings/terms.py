@@ -63,7 +63,7 @@ class VariableRange(NamedTuple):
     @property
     def terms(self) -> list[Term]:
         """The terms with an exact shape."""
-        return [one for one in self.variable.terms if one.name not in self.curves]
+        return [term for term in self.variable.terms if term.name not in self.curves]
 
     def lines(self, shape: Shape) -> Between:
         """Return a curve as lines; of single values each is level for a length of 1.
@@ -184,11 +184,11 @@ def _about(
 def use_answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer whether terms are used."""
     system, variables = subject.system, subject.rules.variables
-    propositions = [*used_terms(subject.rules)]
+    propositions = [*terms_in_use(subject.rules)]
     if system is not None and subject.policy.decision == "all":
         variables = system.variables  # the view may lack rules and terms
-        every = (one for rule in system.rules for one in questions(rule.when))
-        propositions = [(one.variable, one.term or "") for one in every]
+        every = (p for rule in system.rules for p in questions(rule.when))
+        propositions = [(p.variable, p.term or "") for p in every]
     used, needed = set(propositions), {variable for variable, _ in propositions}
     for variable in subject.rules.variables:
         if variable.name in needed:
@@ -199,7 +199,7 @@ def use_answers(subject: Subject) -> Iterator[AuditAnswer]:
             own = tuple(TermName(variable.name, term.name) for term in variable.terms)
             title = f"variable {variable.name!r}"
             yield audit_answer("FT404.unused", title, proof, terms=own)
-    names = [(one.name, term.name) for one in variables for term in one.terms]
+    names = [(v.name, term.name) for v in variables for term in v.terms]
     for name in names:
         if name[0] in needed and name not in used:
             title, own = f"term {name[1]!r} of {name[0]!r}", (TermName(*name),)
@@ -208,12 +208,12 @@ def use_answers(subject: Subject) -> Iterator[AuditAnswer]:
         "FT404.used",
         "terms and variables",
         proof,
-        Measure("variables in use", sum(one.name in needed for one in variables)),
+        Measure("variables in use", sum(v.name in needed for v in variables)),
         Measure("terms in use", sum(name in used for name in names)),
     )
 
 
-def used_terms(rules: RuleBase) -> Iterator[tuple[str, str]]:
+def terms_in_use(rules: RuleBase) -> Iterator[tuple[str, str]]:
     """Yield the variables and terms that rules use, as often as they do."""
     for rule in rules.rules:
         for proposition in rule.when:
@@ -236,7 +236,7 @@ def shape_answers(subject: Subject) -> Iterator[AuditAnswer]:
         for term in of.terms:
             subject.budget.check()
             every = [*_defects(of, term)]
-            defects = [one for one in every if one is not None]
+            defects = [defect for defect in every if defect is not None]
             shallow += len(every) - len(defects)
             sound += not defects
             is_curved |= isinstance(term.shape, LR)
@@ -368,7 +368,7 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
             elif shared.jaccard.high < limit:
                 apart += 1
             else:
-                answer = _overlapping(of, pair, shared, limit)
+                answer = _overlap(of, pair, shared, limit)
                 overlaps.append((-shared.jaccard.low, answer))
     overlaps.sort(key=lambda pair: pair[0])
     yield from (answer for _, answer in overlaps[:MOST_SHOWN])
@@ -388,7 +388,7 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
         )
 
 
-def _overlapping(
+def _overlap(
     of: VariableRange,
     pair: tuple[Term, Term],
     shared: measures.Overlap,
@@ -422,7 +422,7 @@ def _overlapping(
 def size_answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Count rules, propositions and terms, and compute the index of Nauck."""
     lengths = [len(rule.when) for rule in subject.rules.rules]
-    used = set(used_terms(subject.rules))
+    used = set(terms_in_use(subject.rules))
     numbers = [
         Measure("rules", len(lengths)),
         Measure("propositions", sum(lengths)),
@@ -457,7 +457,7 @@ def nauck(subject: Subject) -> list[tuple[str, Bounds]]:
     Integrals are taken exactly, not on a grid. Nothing is returned if no rule uses a
     variable, a range is a point, or a term has no exact shape.
     """
-    terms = set(used_terms(subject.rules))
+    terms = set(terms_in_use(subject.rules))
     names = {variable for variable, _ in terms}
     used = [of for of in ranges(subject) if of.variable.name in names]
     is_known = terms.isdisjoint(subject.inexact)
@@ -465,8 +465,8 @@ def nauck(subject: Subject) -> list[tuple[str, Bounds]]:
         return []
     lengths = [len({c.variable for c in rule.when}) for rule in subject.rules.rules]
     size = Fraction(len(subject.rules.classes), sum(lengths))
-    each = [coverage(of) for of in used]
-    low, high = (sum(ends, ZERO) / len(used) for ends in zip(*each, strict=True))
+    bounds = [coverage(of) for of in used]
+    low, high = (sum(ends, ZERO) / len(used) for ends in zip(*bounds, strict=True))
     shares = (Fraction(1, max(len(of.terms) - 1, 1)) for of in used)
     partition = sum(shares, ZERO) / len(used)
     return [

@@ -19,8 +19,8 @@ from fuzzytree.auditing.findings.configuration import (
 from fuzzytree.auditing.findings.records import Audit, AuditSelection, AuditSettings
 from fuzzytree.auditing.findings.results import (
     baseline_of,
+    obsolete_ids,
     read_baseline,
-    resolved_ids,
 )
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.errors import ReadError
@@ -139,17 +139,17 @@ def test_a_baseline_that_was_written_is_read_and_accepts_all(tmp_path: Path) -> 
     path.write_bytes(baseline_of(found))
     (one,) = found.findings
     assert read_baseline(path) == {one.id: one.sentence}
-    assert not [*resolved_ids(read_baseline(path), found)]
+    assert not [*obsolete_ids(read_baseline(path), found)]
 
 
 def test_accepted_findings_that_are_gone_are_reported_for_codes_that_were_run() -> None:
     known = {"FT101-00000000": "a", "FT501-00000000": "not run here"}
-    assert [*resolved_ids(known, far())] == ["FT101-00000000"]
+    assert [*obsolete_ids(known, far())] == ["FT101-00000000"]
 
 
 def test_of_a_code_that_was_cut_short_nothing_is_said_to_be_gone() -> None:
     cut = replace(far(), unasked=("FT101 dead rule: cut short: interrupted",))
-    assert not [*resolved_ids({"FT101-00000000": "a"}, cut)]
+    assert not [*obsolete_ids({"FT101-00000000": "a"}, cut)]
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.auditing.decide.domain import DomainSide
-from fuzzytree.auditing.findings.domains import domain_of, limited
+from fuzzytree.auditing.findings.domains import domain_of, limit_domain
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model import (
     LR,
@@ -244,7 +244,9 @@ def test_an_input_that_a_formula_may_name_needs_limits() -> None:
 
 def test_an_input_whose_limits_are_given_needs_no_others() -> None:
     box = domain_of(SUM, limited=["x"])
-    assert limited(box, {"x": (0.0, 1.0)}, SUM).sides == (DomainSide("x", 0.0, 1.0),)
+    assert limit_domain(box, {"x": (0.0, 1.0)}, SUM).sides == (
+        DomainSide("x", 0.0, 1.0),
+    )
 
 
 def test_rows_stand_in_where_nothing_is_declared() -> None:
@@ -275,5 +277,5 @@ def test_wrong_limits_are_one_sentence(
     limits: dict[str, tuple[float, float]], message: str
 ) -> None:
     with pytest.raises(ValueError, match=r".") as caught:
-        limited(domain_of(grip()), limits, grip())
+        limit_domain(domain_of(grip()), limits, grip())
     assert str(caught.value) == message

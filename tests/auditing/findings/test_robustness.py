@@ -61,10 +61,10 @@ def test_the_point_that_is_reported_is_decided_as_the_sentence_says() -> None:
         "; where 'force' is (5.0000[0-9]+) it becomes 'soft'", found.sentence
     )
     assert moved is not None
-    decided = RowDecider(subject).decided
+    decision = RowDecider(subject).decision
     slip = Fraction(0.3)
-    assert decided({"force": Fraction(moved[1]), "slip": slip})[0] == "soft"
-    assert decided({"force": Fraction(5), "slip": slip})[0] == "open"
+    assert decision({"force": Fraction(moved[1]), "slip": slip})[0] == "soft"
+    assert decision({"force": Fraction(5), "slip": slip})[0] == "open"
 
 
 def test_a_cut_moved_away_makes_the_radius_larger() -> None:
@@ -108,7 +108,7 @@ def test_exact_ties_are_decided_by_the_order_of_rules() -> None:
     assert "ties" not in second.sentence + whole.sentence
     assert _number(second, "certified radius, in ranges") <= 0.5
     assert isinstance(second.state, Witness)
-    assert RowDecider(subject_of(raw)).decided({"x": Fraction(1, 4)})[0] == "a"
+    assert RowDecider(subject_of(raw)).decision({"x": Fraction(1, 4)})[0] == "a"
 
 
 def test_a_row_has_its_decision_first_and_then_its_radius() -> None:
@@ -170,11 +170,11 @@ def _check(subject: Subject, row: Mapping[str, float], points: int, seed: int) -
     found = radius(subject, row)
     start = {name: Fraction(value) for name, value in row.items()}
     decider = RowDecider(subject)
-    label, _ = decider.decided(start)
+    label, _ = decider.decision(start)
     model = subject.tree or subject.rules
     if isinstance(found.state, Witness):
         point = point_of(found.state.point)
-        assert decider.decided(point)[0] == found.state.claims[0].label != label
+        assert decider.decision(point)[0] == found.state.claims[0].label != label
         near = float(Costs(subject.domain, [*row]).distance(start, point))
         assert near == pytest.approx(
             _number(found, "distance of the witness, in ranges")

@@ -7,32 +7,32 @@ import pytest
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.configuration import (
     check_settings,
-    chosen_codes,
+    code_selection,
     settings_with,
 )
 from fuzzytree.auditing.findings.records import AuditSettings
 
 
 def test_all_codes_are_tested_unless_some_are_chosen() -> None:
-    assert chosen_codes() == set(CODES)
+    assert code_selection() == set(CODES)
 
 
 def test_ignoring_goes_before_selecting() -> None:
-    chosen = chosen_codes(["FT4", "FT301"], ["FT402"])
+    chosen = code_selection(["FT4", "FT301"], ["FT402"])
     queries = {code for code in chosen if not code.startswith("FTD")}
     assert queries == {"FT401", "FT403", "FT404", "FT301"}
 
 
 def test_reasons_for_declining_are_reported_whatever_is_selected() -> None:
     declined = {code for code in CODES if code.startswith("FTD")}
-    assert chosen_codes(["FT501"]) == {"FT501", *declined}
-    assert chosen_codes(["FT5"], ["FT4"]) == {"FT501", *declined}
+    assert code_selection(["FT501"]) == {"FT501", *declined}
+    assert code_selection(["FT5"], ["FT4"]) == {"FT501", *declined}
 
 
 @pytest.mark.parametrize("text", ["FTD", "FTD04"])
 def test_reasons_for_declining_cannot_be_left_out(text: str) -> None:
     with pytest.raises(ValueError, match=r".") as caught:
-        chosen_codes([], [text])
+        code_selection([], [text])
     results = f"the code {text!r} cannot be left out: it reports what was declined"
     assert str(caught.value) == results
 
@@ -40,12 +40,12 @@ def test_reasons_for_declining_cannot_be_left_out(text: str) -> None:
 @pytest.mark.parametrize("text", ["", "FT99", "x", "FT1011"])
 def test_what_begins_no_code_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=f"^no code begins with {text!r}; there is"):
-        chosen_codes([text])
+        code_selection([text])
 
 
 def test_a_misspelt_code_is_answered_with_the_one_that_was_meant() -> None:
     with pytest.raises(ValueError, match=r"\(did you mean 'FT101'\?\)$"):
-        chosen_codes([], ["FT1O1"])
+        code_selection([], ["FT1O1"])
 
 
 @pytest.mark.parametrize(
@@ -82,4 +82,4 @@ def test_a_budget_of_nothing_or_without_end_is_refused(budget: float) -> None:
 def test_a_choice_that_leaves_nothing_to_ask_is_refused() -> None:
     message = "^select and skip leave no code to answer$"
     with pytest.raises(ValueError, match=message):
-        chosen_codes(["FT2"], ["FT2"])
+        code_selection(["FT2"], ["FT2"])

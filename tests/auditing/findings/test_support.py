@@ -20,7 +20,7 @@ from fuzzytree.auditing.findings.support import (
     answers,
     count_rows,
     sample_points,
-    sampled_share,
+    share_in_sample,
     wilson,
 )
 from fuzzytree.model import (
@@ -113,7 +113,7 @@ def test_rows_are_reported_rule_by_rule_and_together() -> None:
         "rule 2 fires on 3 of 6 rows and wins 3; 2 of these have its class 'hard'",
     ]
     state = found["rule 2"].state
-    assert state == sampled_share(
+    assert state == share_in_sample(
         "rows that rule 2 wins and that have its class",
         2,
         3,

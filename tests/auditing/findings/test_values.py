@@ -11,7 +11,7 @@ import pytest
 from fuzzytree import learn
 from fuzzytree.auditing.decide.domain import Domain, DomainSide, contains, span
 from fuzzytree.auditing.decide.regions import cut_side
-from fuzzytree.auditing.findings.domains import domain_of, limited
+from fuzzytree.auditing.findings.domains import domain_of, limit_domain
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.checking import load_content
 from fuzzytree.exporters import find_format
@@ -90,7 +90,7 @@ def test_the_span_of_an_input_reaches_to_its_stand_in() -> None:
 
 
 def test_limits_leave_out_categories_and_stand_ins_beyond_them() -> None:
-    town, age = limited(Domain((TOWN, AGE)), {"town": "Oslo,Rom"}, MODEL).sides
+    town, age = limit_domain(Domain((TOWN, AGE)), {"town": "Oslo,Rom"}, MODEL).sides
     assert (town.values, town.missing, age) == ((1.0, 2.0), None, AGE)
 
 
@@ -125,12 +125,12 @@ def test_limits_of_whole_numbers_are_whole() -> None:
     model = msgspec.structs.replace(MODEL, variables=(MODEL.variables[0], DOORS))
     box = domain_of(model)
     assert box.sides[1] == DomainSide("age", 1.0, 5.0, "model", is_whole=True)
-    side = limited(box, {"age": (1.5, 4.5)}, model).sides[1]
+    side = limit_domain(box, {"age": (1.5, 4.5)}, model).sides[1]
     assert (side.low, side.high, side.is_whole) == (2.0, 4.0, True)
     with pytest.raises(
         ValueError, match=r"'age' is a whole number, and 1.5 to 1.6 has"
     ):
-        limited(box, {"age": (1.5, 1.6)}, model)
+        limit_domain(box, {"age": (1.5, 1.6)}, model)
 
 
 def test_learn_finds_the_columns_of_whole_numbers() -> None:
@@ -158,7 +158,7 @@ def test_learn_finds_the_columns_of_whole_numbers() -> None:
 def test_limits_name_categories(
     limits: dict[str, str], values: tuple[float | None, ...]
 ) -> None:
-    town = limited(domain_of(MODEL), limits, MODEL).sides[0]
+    town = limit_domain(domain_of(MODEL), limits, MODEL).sides[0]
     assert (*town.values, town.missing) == values
 
 
@@ -172,7 +172,7 @@ def test_limits_name_categories(
 )
 def test_limits_of_no_category_are_refused(limits: str, text: str) -> None:
     with pytest.raises(ValueError, match=f"^{text}$"):
-        limited(domain_of(MODEL), {"town": limits}, MODEL)
+        limit_domain(domain_of(MODEL), {"town": limits}, MODEL)
 
 
 @pytest.mark.parametrize(
@@ -186,5 +186,5 @@ def test_limits_of_dates_are_dates(text: str) -> None:
             msgspec.structs.replace(DOORS, unit=DATE_UNIT),
         ),
     )
-    side = limited(domain_of(model), {"age": text}, model).sides[1]
+    side = limit_domain(domain_of(model), {"age": text}, model).sides[1]
     assert (side.low, side.high) == (19783.0, 19784.0)
