@@ -767,7 +767,7 @@ def diff(
     return auditing.difference(
         first,
         second,
-        domain=auditing.joined_domain(first, second, limits or {}, rows),
+        domain=auditing.common_domain(first, second, limits or {}, rows),
         rows=rows,
         settings=settings or auditing.AuditSettings(budget=budget),
         budget=auditing.Budget(int(min(budget, 1e9) * 1e6)),

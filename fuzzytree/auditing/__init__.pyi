@@ -14,8 +14,8 @@ from .decide.states import counted as counted
 from .decide.states import number_text as number_text
 from .decide.states import point_of as point_of
 from .diff.differences import check_common_inputs as check_common_inputs
+from .diff.differences import common_domain as common_domain
 from .diff.differences import difference as difference
-from .diff.differences import joined_domain as joined_domain
 from .diff.records import Change as Change
 from .diff.records import ComparedModel as ComparedModel
 from .diff.records import Difference as Difference

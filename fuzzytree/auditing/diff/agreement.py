@@ -109,9 +109,9 @@ class Agreement:
     ) -> tuple[Prediction, Prediction]:
         """Return what both predict at a point."""
         strengths, _ = self.base.strengths(point)
-        return self._predicted(0, strengths), self._predicted(1, strengths)
+        return self._predict(0, strengths), self._predict(1, strengths)
 
-    def _predicted(self, side: Side, strengths: Sequence[Fraction]) -> Prediction:
+    def _predict(self, side: Side, strengths: Sequence[Fraction]) -> Prediction:
         group, rules = self.groups[side], self.base.rules
         best = max(strengths[k] for k in group)
         if not best:
@@ -201,8 +201,8 @@ class Agreement:
         old, new = self.groups
         budget.spend(len(old) * len(new))
         is_full = self._has_full_rules(budget)
-        meeting = self._meeting(ONE if is_full else ZERO, budget)
-        pairs = [Pair(i, j) for i in old for j in new if meeting[i] >> j & 1]
+        overlaps = self._overlaps(ONE if is_full else ZERO, budget)
+        pairs = [Pair(i, j) for i in old for j in new if overlaps[i] >> j & 1]
         if not is_full:
             pairs += [Pair(None, j) for j in new]
             pairs += [Pair(i, None) for i in (*old, None)]
@@ -217,8 +217,9 @@ class Agreement:
     @cached_property
     def is_made_of_lines(self) -> bool:
         """Whether no degree is a curve, so that lines are few and exact."""
-        every = (one for rule in self.base.rules for _, one in rule.literals)
-        return all(isinstance(f, Band | Points) for one in every for f in one.functions)
+        every = (literal for rule in self.base.rules for _, literal in rule.literals)
+        functions = (function for literal in every for function in literal.functions)
+        return all(isinstance(function, Band | Points) for function in functions)
 
     def _has_full_rules(self, budget: Budget) -> bool:
         """Return whether a rule of strength 1 decides everywhere, in both models."""
@@ -230,7 +231,7 @@ class Agreement:
             )
         return self._is_full
 
-    def _meeting(self, level: Fraction, budget: Budget) -> list[int]:
+    def _overlaps(self, level: Fraction, budget: Budget) -> list[int]:
         """Return with which rules each may be above 0, or at 1, on a cell of each axis.
 
         Returns:
@@ -239,7 +240,7 @@ class Agreement:
         bits = [self.base.every] * self.base.count
         for axis in self.base.used if self.is_made_of_lines else ():
             cells = [cell.masks for cell in axis.cells_at(level, budget)]
-            masks = {one.perhaps if level else one.perhaps_above for one in cells}
+            masks = {cell.perhaps if level else cell.perhaps_above for cell in cells}
             for place in range(self.base.count):
                 own = 0
                 for mask in masks:
@@ -342,26 +343,27 @@ class Agreement:
 
     def is_below(self, place: int, other: int) -> bool:
         """Return whether a rule is nowhere stronger than another one, by its parts."""
-        one, two = self.base.rules[place], self.base.rules[other]
-        if (one.norm, two.norm) == ("minimum", "product") or one.factor > two.factor:
+        weak, strong = self.base.rules[place], self.base.rules[other]
+        norms = weak.norm, strong.norm
+        if norms == ("minimum", "product") or weak.factor > strong.factor:
             return False
-        left = [*one.literals]
-        for key in two.literals:
+        left = [*weak.literals]
+        for key in strong.literals:
             matches = [own for own in left if self._is_lower(own, key)]
             if not matches:
                 return False
-            if two.norm == "product":
+            if strong.norm == "product":
                 left.remove(key if key in matches else matches[0])
         return True
 
-    def _is_lower(self, one: Factor, other: Factor) -> bool:
+    def _is_lower(self, low: Factor, high: Factor) -> bool:
         """Return whether a degree is nowhere above another one."""
-        if one == other or one[0] != other[0] or not self.is_made_of_lines:
-            return one == other
-        key = one, other
+        if low == high or low[0] != high[0] or not self.is_made_of_lines:
+            return low == high
+        key = low, high
         if key not in self._lower:
-            bounds = self.base.axes[one[0]].bounds
-            mine, theirs = bounds[one[1]].upper, bounds[other[1]].lower
+            bounds = self.base.axes[low[0]].bounds
+            mine, theirs = bounds[low[1]].upper, bounds[high[1]].lower
             sides = zip(mine[1:], theirs[1:], strict=True)
             self._lower[key] = all(
                 a <= b for side in sides for a, b in zip(*side, strict=True)

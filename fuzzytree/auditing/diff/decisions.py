@@ -65,7 +65,7 @@ def class_answers(
     answers: list[AuditAnswer] = []
     if rows is not None:
         answers.append(_on_rows(rows, differences, points))
-    many, count = differences.add(pair.drawn(settings.rows, settings.seed), points)
+    many, count = differences.add(pair.draw(settings.rows, settings.seed), points)
     probes = pair.within(probe_values(model, _PROBES) for model in (old, new))
     differences.add(probes, points)
     if not differences.witnesses:

@@ -45,16 +45,16 @@ def check_common_inputs(old: Document, new: Document, names: tuple[str, str]) ->
     Raises:
         ReadError: If no input of one is an input of the other.
     """
-    one, other = old.inputs, new.inputs
-    if one and other and not set(one) & set(other):
+    before, after = old.inputs, new.inputs
+    if before and after and not set(before) & set(after):
         raise ReadError(
             f"{names[1]}: has no input in common with {names[0]}: it uses "
-            f"{', '.join(map(repr, other))}, and that uses "
-            f"{', '.join(map(repr, one))}"
+            f"{', '.join(map(repr, after))}, and that uses "
+            f"{', '.join(map(repr, before))}"
         )
 
 
-def joined_domain(
+def common_domain(
     old: Document,
     new: Document,
     limits: Limits,
@@ -80,16 +80,16 @@ def joined_domain(
             places = [inputs.index(name) for name in model.inputs]
             own_rows = AuditRows(rows.name, rows.values[places])
         for side in domain_of(model, rows=own_rows, limited=limits).sides:
-            known = sides.get(side.variable)
-            origins = (known.origin if known else "unused", side.origin)
+            earlier = sides.get(side.variable)
+            origins = (earlier.origin if earlier else "unused", side.origin)
             if origins[0] == "unused" or origins == ("curves", "model"):
                 sides[side.variable] = side
-            elif known is not None and known.origin == side.origin:
+            elif earlier is not None and earlier.origin == side.origin:
                 sides[side.variable] = msgspec.structs.replace(
                     side,
-                    low=min(known.low, side.low),
-                    high=max(known.high, side.high),
-                    values=tuple(sorted({*known.values, *side.values})),
+                    low=min(earlier.low, side.low),
+                    high=max(earlier.high, side.high),
+                    values=tuple(sorted({*earlier.values, *side.values})),
                 )
     domain = Domain(tuple(sides.values()))
     if limits:
@@ -168,7 +168,7 @@ def difference(
         tuple(sorted(changes, key=lambda change: order[change.grade])),
         tuple(map(words.answer, answers)),
     )
-    return _confirmed(result, models)
+    return _confirm(result, models)
 
 
 def _as_rules(model: Document) -> RuleBase | FuzzySystem:
@@ -182,7 +182,7 @@ def _as_rules(model: Document) -> RuleBase | FuzzySystem:
             return model
 
 
-def _confirmed(result: Difference, models: tuple[Document, Document]) -> Difference:
+def _confirm(result: Difference, models: tuple[Document, Document]) -> Difference:
     """Return a comparison whose PROVED answers a solver confirms, if one is at hand."""
 
     def confirmation() -> Report:

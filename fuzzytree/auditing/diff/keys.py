@@ -247,8 +247,8 @@ class Keys:
         """Return the key of a condition."""
         match when:
             case Proposition(variable=variable, terms=terms, hedges=hedges):
-                each = [self._term(variable, name) for name in terms]
-                return self.sources.get(variable, variable), hedges, frozenset(each)
+                keys = frozenset(self._term(variable, name) for name in terms)
+                return self.sources.get(variable, variable), hedges, keys
             case Not(part=part):
                 return "not", self.condition(part, block)
             case And(parts=parts):

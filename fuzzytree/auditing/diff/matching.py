@@ -188,11 +188,11 @@ def match_rules(old: list[MatchRule], new: list[MatchRule]) -> tuple[Matching, i
     scores: list[tuple[float, int, int]] = []
     for a in () if is_large else removed:
         for b in added:
-            one, other = old[a], new[b]
-            common = len(one.operands) - len(one.unlike(other))
-            score = 2.0 * common / (len(one.operands) + len(other.operands) or 1)
-            if common and one.block == other.block:
-                scores.append((-score - 0.5 * (one.then == other.then), a, b))
+            was, now = old[a], new[b]
+            common = len(was.operands) - len(was.unlike(now))
+            score = 2.0 * common / (len(was.operands) + len(now.operands) or 1)
+            if common and was.block == now.block:
+                scores.append((-score - 0.5 * (was.then == now.then), a, b))
     for _, a, b in sorted(scores):
         if a in removed and b in added:
             matches.append((a, b, PROPOSITIONS))

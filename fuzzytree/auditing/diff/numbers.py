@@ -120,7 +120,7 @@ def _answers(
         return
     is_rounded = [proofs[name] is _ROUNDED for name in left]
     differences = _Numbers(pair, left, is_rounded, steps)
-    answers = [*_sampled(differences, rows, settings, budget, report)]
+    answers = [*_sample_answers(differences, rows, settings, budget, report)]
     if not differences.largest and None not in proofs.values():
         size = Measure("largest difference by rounding", differences.rounding)
         if any(is_rounded):
@@ -170,7 +170,7 @@ def _all_alike(
     return audit_answer(key, subject, Proved(proof.how), *measures, facts=facts)
 
 
-def _sampled(
+def _sample_answers(
     differences: _Numbers,
     rows: AuditRows | None,
     settings: AuditSettings,
@@ -184,7 +184,7 @@ def _sampled(
         samples.append(("rows", rows.values, f"rows of {rows.name}"))
     probes = pair.within(_probes(system) for system in (pair.old, pair.new))
     samples.append(("probes", probes, "probes of both systems within the domain"))
-    points = pair.drawn(min(settings.rows, _DRAWN), seed)
+    points = pair.draw(min(settings.rows, _DRAWN), seed)
     samples.append(
         ("domain", points, f"points drawn evenly from the domain, seed {seed}")
     )
@@ -318,7 +318,7 @@ def _text(number: float) -> str:
 # --- bounds
 
 
-def _clamped(variable: SystemOutput | Variable, value: Fraction) -> Fraction:
+def _clamp(variable: SystemOutput | Variable, value: Fraction) -> Fraction:
     low, high = variable.low, variable.high
     value = value if low is None else max(value, Fraction(low))
     return value if high is None else min(value, Fraction(high))
@@ -346,9 +346,9 @@ def most(
     Returns:
         None where nothing bounds the output, such as a formula.
     """
-    one, other = (_Output(system, output, domain) for system in (old, new))
-    bounds = [bound for bound in (_moved(one, other), _apart(one, other)) if bound]
-    return min(bounds, key=itemgetter(0), default=None)
+    before, after = (_Output(system, output, domain) for system in (old, new))
+    bounds = (_shift_bound(before, after), _span_bound(before, after))
+    return min(filter(None, bounds), key=itemgetter(0), default=None)
 
 
 class _Output:
@@ -396,7 +396,7 @@ class _Output:
             return None
         low, high = min(ends), max(ends)
         if output.clips:
-            return _clamped(output, low), _clamped(output, high)
+            return _clamp(output, low), _clamp(output, high)
         return low, high
 
 
@@ -412,38 +412,38 @@ def _ends(weights: Point, offset: Fraction, domain: Domain) -> _Ends | None:
     return low, high
 
 
-def _apart(one: _Output, other: _Output) -> _Bound | None:
+def _span_bound(old: _Output, new: _Output) -> _Bound | None:
     """Return how far apart numbers are that lie between some ends."""
-    span, other_span = one.span(), other.span()
-    if span is None or other_span is None:
+    a, b = old.span(), new.span()
+    if a is None or b is None:
         return None
-    apart = max(abs(other_span[1] - span[0]), abs(span[1] - other_span[0]))
+    apart = max(abs(b[1] - a[0]), abs(a[1] - b[0]))
     return apart, "both answers lie between the numbers that rules conclude"
 
 
-def _moved(one: _Output, other: _Output) -> _Bound | None:
+def _shift_bound(old: _Output, new: _Output) -> _Bound | None:
     """Return the bound where only numbers differ, and all degrees are the same."""
     degrees, others = (
         [facts_of(of.output), *((e.strength, e.term.height) for e in of.entries)]
-        for of in (one, other)
+        for of in (old, new)
     )
-    is_large = one.is_sum and not (one.is_small and other.is_small)
-    is_weighted = one.output.defuzzifier.is_weighted
-    is_free = is_weighted and not (is_large or one.is_joined or other.is_joined)
+    is_large = old.is_sum and not (old.is_small and new.is_small)
+    is_weighted = old.output.defuzzifier.is_weighted
+    is_free = is_weighted and not (is_large or old.is_joined or new.is_joined)
     if degrees != others or not is_free:
         return None
     moves = [ZERO]
-    for entry, a, b in zip(one.entries, one.sums(), other.sums(), strict=True):
+    for entry, a, b in zip(old.entries, old.sums(), new.sums(), strict=True):
         if a is None or b is None:
             return None
         weights = {n: a[0].get(n, ZERO) - b[0].get(n, ZERO) for n in {**a[0], **b[0]}}
-        ends = _ends(weights, a[1] - b[1], one.domain)
+        ends = _ends(weights, a[1] - b[1], old.domain)
         if ends is None:
             return None
-        scale = Fraction(entry.most) if one.is_sum else 1
+        scale = Fraction(entry.most) if old.is_sum else 1
         moves.append(scale * max(abs(ends[0]), abs(ends[1])))
-    bound = sum(moves, ZERO) if one.is_sum else max(moves)
-    before, after = one.output.default, other.output.default
+    bound = sum(moves, ZERO) if old.is_sum else max(moves)
+    before, after = old.output.default, new.output.default
     if before != after:
         if before is None or after is None:
             return None

@@ -86,20 +86,20 @@ class Pair(msgspec.Struct, Generic[Model], frozen=True, eq=False):
         """Return the columns of one model, of values of shape (inputs, rows)."""
         return values[[self.inputs.index(name) for name in model.inputs]]
 
-    def drawn(self, count: int, seed: int) -> FloatArray:
+    def draw(self, count: int, seed: int) -> FloatArray:
         """Return points drawn evenly from the domain."""
         return sample_points(union(self.old, self.new), self.domain, count, seed)
 
-    def within(self, each: Iterable[FloatArray]) -> FloatArray:
+    def within(self, tables: Iterable[FloatArray]) -> FloatArray:
         """Return rows of both models in the domain, with other inputs in the middle."""
         sides = {side.variable: side for side in self.domain.sides}
         middle = [sides[name].low / 2 + sides[name].high / 2 for name in self.inputs]
-        tables: list[FloatArray] = []
-        for model, rows in zip((self.old, self.new), each, strict=True):
+        parts: list[FloatArray] = []
+        for model, rows in zip((self.old, self.new), tables, strict=True):
             table = np.repeat(np.array(middle)[:, None], rows.shape[1], axis=1)
             table[[self.inputs.index(name) for name in model.inputs]] = rows
-            tables.append(table)
-        values = np.hstack(tables)
+            parts.append(table)
+        values = np.hstack(parts)
         outside = rows_outside(union(self.old, self.new), self.domain, values)
         inside: FloatArray = values[:, ~outside]
         return inside

@@ -247,10 +247,10 @@ class Structure:
                 noun = f"rule {verbs[0]}" if count == 1 else f"rules {verbs[1]}"
                 text = f"{count} {noun} {what}"
                 text += "" if is_support or was == now else sharpness
-                one = _Spot((), rules=tuple(a for a, _ in rules))
-                other = _Spot((), rules=tuple(b for _, b in rules))
+                mine = _Spot((), rules=tuple(a for a, _ in rules))
+                theirs = _Spot((), rules=tuple(b for _, b in rules))
                 self._report(
-                    "support", text, "never", one, other, is_harmless=is_support
+                    "support", text, "never", mine, theirs, is_harmless=is_support
                 )
 
     def _compare_sets(self, old: FuzzyTree, new: FuzzyTree) -> None:
@@ -280,8 +280,8 @@ class Structure:
         for place, (was, now) in enumerate(zip_longest(old.blocks, new.blocks)):
             if was and now:
                 of = f" of block {place + 1}" if place else ""
-                one, other = (_Spot(("blocks", place), block) for block in (was, now))
-                self._compare_fields("block", of, one, other, ("rules",))
+                a, b = (_Spot(("blocks", place), block) for block in (was, now))
+                self._compare_fields("block", of, a, b, ("rules",))
             else:
                 text = f"block {place + 1} {'was removed' if was else 'is new'}"
                 sides = _side(_Spot(("blocks", place)), is_new=was is None)
@@ -446,16 +446,16 @@ class Structure:
             lambda spot: self.curves.key(spot.part),
         )
         for a, b, is_renamed in matches:
-            one, other = mine[a], theirs[b]
-            name = f"{one.part.name!r} of "
+            spot, other = mine[a], theirs[b]
+            name = f"{spot.part.name!r} of "
             if is_renamed:
                 text = f"the term {name}{old.name!r} is called {other.part.name!r}"
                 self._report_name(
-                    text, one._replace(rules=()), other._replace(rules=())
+                    text, spot._replace(rules=()), other._replace(rules=())
                 )
-            elif self.curves.key(one.part) != self.curves.key(other.part):
+            elif self.curves.key(spot.part) != self.curves.key(other.part):
                 text = f"the curve of {name}{new.name!r} has changed"
-                self._report_curve(text, old, one, other)
+                self._report_curve(text, old, spot, other)
         for is_used in (True, False):
             gone = [mine[a] for a in removed if bool(mine[a].rules) is is_used]
             come = [theirs[b] for b in added if bool(theirs[b].rules) is is_used]
@@ -480,12 +480,12 @@ class Structure:
     def _report_curve(self, text: str, variable: Any, old: _Spot, new: _Spot) -> None:
         """Report that a curve has changed, with how far the two are apart."""
         measures: tuple[Measure, ...] = ()
-        one, other = shape_of(old.part.function), shape_of(new.part.function)
+        mine, theirs = shape_of(old.part.function), shape_of(new.part.function)
         heights = {old.part.height, new.part.height}
-        if isinstance(variable, Variable) and one and other and heights == {1.0}:
+        if isinstance(variable, Variable) and mine and theirs and heights == {1.0}:
             low, high = span(variable, self.domain)
             if low <= high:
-                distance = curve_distance(one, other, low, high)
+                distance = curve_distance(mine, theirs, low, high)
                 most, at = outwards(distance.high)[1], float(distance.at)
                 exact = str(distance.low) if distance.low == distance.high else None
                 near = f", by {most:.3g} at most, near {at:.6g}"

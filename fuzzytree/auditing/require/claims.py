@@ -29,13 +29,13 @@ class OrderClaim(NamedTuple):
     labels: tuple[str, ...]
 
 
-class UnchangedClaim(NamedTuple):
+class ConstancyClaim(NamedTuple):
     """No prediction depends on some inputs."""
 
     columns: tuple[str, ...]
 
 
-class CoveredClaim(NamedTuple):
+class CoverageClaim(NamedTuple):
     """Every output of a system has a number that rules conclude."""
 
 
@@ -48,7 +48,7 @@ class NumberClaim(NamedTuple):
     input: str = ""
 
 
-Claim = ClassClaim | OrderClaim | UnchangedClaim | CoveredClaim | NumberClaim
+Claim = ClassClaim | OrderClaim | ConstancyClaim | CoverageClaim | NumberClaim
 
 
 class Requirement(NamedTuple):

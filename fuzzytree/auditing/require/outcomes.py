@@ -33,10 +33,10 @@ from fuzzytree.auditing.decide.regions import (
 from fuzzytree.auditing.require.claims import (
     Claim,
     ClassClaim,
-    CoveredClaim,
+    ConstancyClaim,
+    CoverageClaim,
     NumberClaim,
     OrderClaim,
-    UnchangedClaim,
 )
 from fuzzytree.auditing.require.search import (
     Loss,
@@ -65,10 +65,10 @@ def outcome_of(claim: Claim, search: Search) -> Outcome:
                 return class_outcome(search, labels)
             case OrderClaim():
                 return order_outcome(search, claim)
-            case UnchangedClaim(columns=columns):
-                return unchanged_outcome(search, columns)
-            case CoveredClaim() if isinstance(model, FuzzySystem):
-                return covered_outcome(search, model)
+            case ConstancyClaim(columns=columns):
+                return constancy_outcome(search, columns)
+            case CoverageClaim() if isinstance(model, FuzzySystem):
+                return coverage_outcome(search, model)
             case NumberClaim() if isinstance(model, FuzzySystem):
                 return number_outcome(search, model, claim)
             case _:
@@ -139,7 +139,7 @@ def order_outcome(search: Search, claim: OrderClaim) -> Outcome:
     return Outcome("OPEN", "an order of classes is proved of trees only")
 
 
-def unchanged_outcome(search: Search, columns: tuple[str, ...]) -> Outcome:
+def constancy_outcome(search: Search, columns: tuple[str, ...]) -> Outcome:
     """Return whether no prediction depends on some inputs."""
     model, rules, axes = search.model, search.base.rules, search.base.axes
     scales = [0.5]  # of the position of a class
@@ -255,7 +255,7 @@ def _values(side: DomainSide, union: Union) -> list[float]:
 # --- outputs of fuzzy systems
 
 
-def covered_outcome(search: Search, system: FuzzySystem) -> Outcome:
+def coverage_outcome(search: Search, system: FuzzySystem) -> Outcome:
     """Return whether every output of a system has a number that rules conclude."""
     run = run_system(system)
 

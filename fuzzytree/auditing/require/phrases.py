@@ -25,11 +25,11 @@ from fuzzytree.auditing.findings.domains import read_value
 from fuzzytree.auditing.require.claims import (
     Claim,
     ClassClaim,
-    CoveredClaim,
+    ConstancyClaim,
+    CoverageClaim,
     NumberClaim,
     OrderClaim,
     Requirement,
-    UnchangedClaim,
 )
 from fuzzytree.cells import number_of
 from fuzzytree.files import PathLike, read_bounded
@@ -147,7 +147,7 @@ def _condition(match: re.Match[str], variable: Variable) -> _Spans:
         )
     if match["sign"] is None:
         low, high = (read_value(variable, match[end]) for end in ("low", "high"))
-        return (_ordered(low, high, match),)
+        return (_check_ends(low, high, match),)
     end = read_value(variable, match["end"])
     match match["sign"]:
         case "<":
@@ -160,7 +160,7 @@ def _condition(match: re.Match[str], variable: Variable) -> _Spans:
             return ((end, math.inf),)
 
 
-def _ordered(low: float, high: float, match: re.Match[str]) -> tuple[float, float]:
+def _check_ends(low: float, high: float, match: re.Match[str]) -> tuple[float, float]:
     if low <= high:
         return low, high
     ends = f"the ends {match['low']} and {match['high']} are swapped"
@@ -215,7 +215,7 @@ def _claim(text: str, model: Document) -> Claim:
         every = sorted({*model.inputs, *getattr(model, "columns", ())})
         names = _names(columns, r",|\bor\b|\band\b")
         chosen = [_choice(name, "column", every) for name in names]
-        return UnchangedClaim(tuple(name for name in chosen if name in model.inputs))
+        return ConstancyClaim(tuple(name for name in chosen if name in model.inputs))
     if isinstance(model, FuzzySystem):
         return _output_claim(match, model)
     return _class_claim(match, model.classes, model)
@@ -241,7 +241,7 @@ def _class_claim(
 def _output_claim(match: re.Match[str], system: FuzzySystem) -> Claim:
     words = match.groupdict()
     if not words:
-        return CoveredClaim()
+        return CoverageClaim()
     outputs = [output.name for output in system.outputs]
     output = _choice(words["output"], "output", outputs)
     name = _input(words["input"], system).name if "input" in words else ""
@@ -253,7 +253,7 @@ def _output_claim(match: re.Match[str], system: FuzzySystem) -> Claim:
             text = f"the largest change must be 0 or more, not {words['slope']}"
             raise ValueError(text)
     elif "low" in words:
-        low, high = _ordered(_number(words["low"]), _number(words["high"]), match)
+        low, high = _check_ends(_number(words["low"]), _number(words["high"]), match)
     elif words["way"] in ("least", "rises"):
         low = _number(words.get("end", "0"))
     else:

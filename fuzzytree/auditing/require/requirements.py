@@ -63,7 +63,7 @@ def _answer(
     """Return what is known of a requirement, by its worst box."""
     worst = Outcome("PROVED", "")
     for box in boxes:
-        search = Search(model, _without_missing(box, requirement.claim), steps)
+        search = Search(model, _without_stand_in(box, requirement.claim), steps)
         outcome = outcome_of(requirement.claim, search)
         if worst.verdict == "PROVED" or outcome.verdict == "REFUTED":
             worst = outcome
@@ -84,7 +84,7 @@ def _answer(
     )
 
 
-def _without_missing(domain: Domain, claim: Claim) -> Domain:
+def _without_stand_in(domain: Domain, claim: Claim) -> Domain:
     """Return a domain in which an input that rises has no missing value."""
     name = getattr(claim, "input", "")
     sides = (
@@ -103,7 +103,7 @@ def _part(model: Document, domain: Domain, of: Requirement, box: Box) -> Domain:
         if variable.parts:
             raise ValueError(f"{side.variable!r} is a sum; limits are for its inputs")
         if ends := box.get(side.variable):
-            part = _narrowed(side, variable, *ends)
+            part = _narrow(side, variable, *ends)
             if part.low > part.high or (side.values and not part.values):
                 raise ValueError(
                     f"{of.text!r}: no row meets the conditions, as the values of "
@@ -115,7 +115,7 @@ def _part(model: Document, domain: Domain, of: Requirement, box: Box) -> Domain:
     return Domain(tuple(sides))
 
 
-def _narrowed(
+def _narrow(
     side: DomainSide, variable: Variable, low: float, high: float
 ) -> DomainSide:
     """Return the values of a side between two ends, which may lie beyond its own."""

@@ -19,7 +19,7 @@ from fuzzytree.auditing.decide.states import (
     Witness,
     point_of,
 )
-from fuzzytree.auditing.diff.differences import difference, joined_domain
+from fuzzytree.auditing.diff.differences import common_domain, difference
 from fuzzytree.auditing.diff.keys import Curves, Keys
 from fuzzytree.auditing.diff.numbers import most
 from fuzzytree.auditing.diff.records import Difference
@@ -85,7 +85,7 @@ def tipper(
 def results(
     old: FuzzySystem, new: FuzzySystem, budget: Budget | None = None
 ) -> Difference:
-    domain = joined_domain(old, new, {})
+    domain = common_domain(old, new, {})
     return difference(old, new, domain=domain, settings=FEW, budget=budget)
 
 
