@@ -7,6 +7,7 @@ as a whole width; so does a change from a number to the stand-in of a missing va
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from fractions import Fraction
 
@@ -15,6 +16,7 @@ from msgspec.structs import replace
 from fuzzytree.auditing.decide.answers import ONE, ZERO
 from fuzzytree.auditing.decide.domain import Domain, DomainSide, Point
 from fuzzytree.model import Value
+from fuzzytree.numerics import outwards
 
 NARROW = Fraction(1, 1000)
 """The bounds of a cost differ by about this share, unless they say why."""
@@ -115,6 +117,54 @@ class Costs:
         """Return what a change of a row costs."""
         every = (self.of(name, old[name], new[name]) for name in self.inputs)
         return max(every, default=ZERO)
+
+    @property
+    def most(self) -> Fraction:
+        """What no change costs more than."""
+        return max(self.whole.values(), default=ZERO)
+
+    def within(self, point: Mapping[str, Fraction], most: Fraction) -> Domain:
+        """Return the part of the domain of all changes up to a cost, about.
+
+        Where ends are no doubles, they are rounded outwards.
+        """
+        sides = self.sides.values()
+        return Domain(
+            tuple(
+                self._near(side, point[side.variable], most)
+                if side.variable in self.whole
+                else side
+                for side in sides
+            )
+        )
+
+    def _near(self, side: DomainSide, x: Fraction, most: Fraction) -> DomainSide:
+        """Return the part of a side around a value of it up to a cost."""
+        name = side.variable
+        reach = ZERO if name in self.fixed else most
+        values = [v for v in side.values if self.of(name, x, Fraction(v)) <= reach]
+        missing = side.missing
+        if missing is not None and self.of(name, x, Fraction(missing)) > reach:
+            missing = None
+        low, high = side.low, side.high
+        if side.values or (x == self.stand_in(name) and self.whole[name] > reach):
+            values = values or [float(x)]  # a stand-in alone
+            low, high, missing = values[0], values[-1], missing if side.values else None
+        elif x != self.stand_in(name) and self.rate[name]:
+            width = reach / self.rate[name]
+            low = max(low, outwards(x - width)[0])
+            high = min(high, outwards(x + width)[1])
+            if side.is_whole:
+                low, high = float(math.ceil(low)), float(math.floor(high))
+        return replace(
+            side,
+            low=low,
+            high=high,
+            values=tuple(values),
+            missing=missing,
+            is_open=side.is_open and low == side.low,
+            is_whole=side.is_whole and not values,
+        )
 
     def nearest(self, side: DomainSide, x: Fraction) -> tuple[Fraction, Fraction]:
         """Return the least cost of a change into a part of an input, and the value.

@@ -12,7 +12,6 @@ from fuzzytree.auditing.decide.answers import Budget, OutOfStepsError, Point
 from fuzzytree.auditing.decide.answers import Proved as NoPoint
 from fuzzytree.auditing.decide.base import Base
 from fuzzytree.auditing.decide.contest import Contest, decided
-from fuzzytree.auditing.decide.costs import Costs
 from fuzzytree.auditing.decide.domain import Domain, DomainSide, contains, simplified
 from fuzzytree.auditing.decide.polytopes import Leaves
 from fuzzytree.auditing.decide.regions import (
@@ -26,7 +25,6 @@ from fuzzytree.auditing.decide.regions import (
     point_in,
     regions,
 )
-from fuzzytree.auditing.decide.search import Search
 from fuzzytree.auditing.decide.states import (
     Claim,
     Declined,
@@ -198,7 +196,6 @@ class TreeAndRules:
     def __init__(self, tree: FuzzyTree, raw: RuleBase, domain: Domain) -> None:
         self.tree, self.raw, self.domain = tree, raw, domain
         self.leaves, self.base = Leaves(tree, domain), Base.of(raw, domain)
-        self.costs = Costs(domain, tree.inputs)
         labels = dict.fromkeys(self.leaves.labels)
         self.contests = {label: Contest(self.base, label) for label in labels}
 
@@ -228,12 +225,8 @@ class TreeAndRules:
             start = point_in(box, self.tree) if number == leaf else None
             if point is not None or start is None:
                 continue
-            contest = self.contests[self.leaves.labels[part]]
-            search = Search(
-                contest, start, self.costs, budget, part=box, accepts=self.differ
-            )
             try:
-                answer = search.any()
+                answer = self.contests[self.leaves.labels[part]].ask(box, budget)
             except OutOfStepsError:
                 why = why or "the budget was spent"
                 continue
