@@ -16,7 +16,7 @@ Ways to decide
 
 Claims
     - `claims`, `pairs`, `cover`: of rules, of two rules, of gaps
-    - `nearest`, `search`, `contest`, `costs`: the nearest change of a row
+    - `nearest`, `contest`, `costs`: the nearest change of a row
     - `outputs`, `measures`: outputs of systems on boxes; heights, areas and distances
 """
 

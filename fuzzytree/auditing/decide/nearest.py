@@ -24,18 +24,16 @@ from fuzzytree.auditing.decide.answers import (
     Proved,
 )
 from fuzzytree.auditing.decide.base import Base
-from fuzzytree.auditing.decide.contest import Contest, decided
+from fuzzytree.auditing.decide.contest import STEPS, Contest, decided
 from fuzzytree.auditing.decide.costs import LEAST, NARROW, Costs, Nearest
 from fuzzytree.auditing.decide.linear import simple
 from fuzzytree.auditing.decide.polytopes import Leaves
 from fuzzytree.model import BoolArray, FloatArray
 
-STEPS = 300_000
-"""The most steps for one row."""
-
 _QUESTIONS = 16  # to the decider for a row
 _MOST_ASKED = 0.25  # of the steps that are left, for a question to the decider
 _TURNS = 12  # of moving a point towards the row
+_WIDER = Fraction(8, 5)  # than `NARROW`, and still narrow
 _HINTS = 3  # points that are evaluated in fractions, of many
 
 
@@ -253,15 +251,21 @@ class _Search:
         """Raise the lower bound by questions; return why it is not near the upper."""
         why, limit, is_tight = "", None, True
         for _ in range(_QUESTIONS):
-            if self.high is not None and self.high <= 2 * LEAST:
-                return ""
-            goal = self.costs.most if self.high is None else self.high * (1 - NARROW)
-            if self.low >= goal:
+            goal = self.costs.most
+            if self.high is not None:
+                goal = self.high * (1 - NARROW)
+                if self.high - self.low <= max(2 * NARROW * self.high, 2 * LEAST):
+                    return ""
+            elif self.low >= goal:
                 return ""
             if limit is not None and limit <= goal:
-                if limit - self.low <= NARROW * limit:
+                if limit - self.low <= NARROW * limit / 8:
                     return why
                 goal = (self.low + limit) / 2
+                if self.high is not None:
+                    gap = self.high - limit
+                    is_close = gap < _WIDER * NARROW * self.high
+                    goal = max(goal, self.high - gap * (_WIDER if is_close else 8))
             elif self.high is not None and not is_tight:
                 goal = (self.low + self.high) / 2
             goal = simple(goal * (1 - NARROW / 8), goal) if self.high else goal
