@@ -93,7 +93,7 @@ class Contest:
         methods = [self._decide, self._halve]
         if not self.base.is_exact:
             methods = [self._halve] if self.base.is_coupled else methods[::-1]
-        own = Budget(STEPS, budget)
+        own = Budget(min(STEPS, budget.left), budget)
         result: Answer = Open("no method applies")
         for method in methods:
             is_last = method is methods[-1]
