@@ -75,25 +75,6 @@ class DomainSide(Value, frozen=True):
             return False
         return stretch(self, value, value).ends(self) is not None
 
-    def distance(self, one: Fraction, other: Fraction) -> Fraction:
-        """Return how far one value is from another, in widths of the side.
-
-        A change of a category is a whole width, whichever the two are, and so is one
-        to or from a stand-in that is no number of the side. Whole numbers are counted
-        in steps: their width is so many steps.
-
-        Example:
-            >>> doors = DomainSide("doors", 1.0, 5.0, is_whole=True, missing=-1.0)
-            >>> [str(doors.distance(Fraction(2), Fraction(n))) for n in (2, 3, -1)]
-            ['0', '1/4', '1']
-        """
-        if one == other:
-            return Fraction(0)
-        is_number = all(self.low <= value <= self.high for value in (one, other))
-        if self.values or not is_number or self.low == self.high:
-            return Fraction(1)
-        return abs(one - other) / (Fraction(self.high) - Fraction(self.low))
-
     def nearest(self, value: Fraction) -> Fraction:
         """Return the value nearest to a number that rows can have, the lower of two.
 

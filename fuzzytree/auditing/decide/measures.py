@@ -200,15 +200,11 @@ def curve_distance(
         >>> [str(x) for x in curve_distance(steep, slow, Fraction(0), Fraction(4))]
         ['1/2', '1/2', '1']
     """
-    return largest_gap(lines_of(one, low, high), lines_of(other, low, high))
-
-
-def largest_gap(one: Between, other: Between) -> CurveDistance:
-    """Return how far two functions are apart at most."""
-    least = (*_gaps(one.lower, other.upper), *_gaps(other.lower, one.upper))
-    most = (*_gaps(one.upper, other.lower), *_gaps(other.upper, one.lower))
-    high, at = max(most, key=itemgetter(0))
-    return CurveDistance(max(ZERO, *(gap for gap, _ in least)), high, at)
+    mine, rival = (lines_of(of, low, high) for of in (one, other))
+    least = (*_gaps(mine.lower, rival.upper), *_gaps(rival.lower, mine.upper))
+    most = (*_gaps(mine.upper, rival.lower), *_gaps(rival.upper, mine.lower))
+    largest, at = max(most, key=itemgetter(0))
+    return CurveDistance(max(ZERO, *(gap for gap, _ in least)), largest, at)
 
 
 def _gaps(one: Lines, other: Lines) -> Iterator[tuple[Fraction, Fraction]]:

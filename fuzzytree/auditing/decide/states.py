@@ -218,29 +218,9 @@ def counted(count: int, noun: str, nouns: str | None = None) -> str:
     return f"{count} {noun if count == 1 else nouns or noun + 's'}"
 
 
-def short(number: float | Fraction) -> str:
-    """Return a number with as many digits as a sentence needs.
-
-    Example:
-        >>> short(Fraction(1, 3))
-        '0.3333'
-    """
-    return f"{float(number):.4g}"
-
-
 def number_text(number: float) -> str:
     """Return a value of an input in six digits, as sentences show it."""
     return f"{number:.6g}"
-
-
-def percent(share: Fraction) -> str:
-    """Return a share in percent, as sentences show it.
-
-    Example:
-        >>> percent(Fraction(1, 300))
-        '0.333 %'
-    """
-    return f"{100.0 * float(share):.3g} %"
 
 
 def answer_text(label: str | None) -> str:

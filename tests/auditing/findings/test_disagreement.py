@@ -14,7 +14,6 @@ from fuzzytree.auditing.decide.states import (
     Proved,
     Sampled,
     Witness,
-    percent,
 )
 from fuzzytree.auditing.findings.leaves import TreeAndRules
 from fuzzytree.auditing.findings.leaves import raw_answers as answers
@@ -84,10 +83,6 @@ def test_a_spent_budget_leaves_a_leaf_open() -> None:
 
 def test_a_tree_without_sets_has_no_disagreement() -> None:
     assert [*answers(subject_of(two_cuts(0.75)))] == []
-
-
-def test_a_share_is_shown_in_three_digits() -> None:
-    assert percent(Fraction(123456, 1000000)) == "12.3 %"
 
 
 def _sampled(seed: int, points: int) -> None:

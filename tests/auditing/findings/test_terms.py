@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
-from fuzzytree.auditing.decide.states import Declined, Proved, short
+from fuzzytree.auditing.decide.states import Declined, Proved
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,
@@ -249,7 +249,3 @@ def test_a_system_is_read_itself_and_not_its_view() -> None:
     made = audit(Material(system), selection=AuditSelection(select=["FT404"]))
     results = [answer.sentence for answer in made.findings]
     assert all(text.startswith("no rule uses") for text in results)
-
-
-def test_short_numbers_have_four_digits() -> None:
-    assert short(Fraction(2, 3)) == "0.6667"
