@@ -1,12 +1,10 @@
 """Points that satisfy linear inequalities, decided in fractions.
 
-The tableau holds integers: each basic variable, times its own whole number, is a sum of
-whole multiples of the others. Pivots follow Bland's rule, so that none comes back.
+Pivots follow Bland's rule, so that none comes back.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
@@ -202,8 +200,7 @@ class _Tableau:
             (ZERO, ONE),
         ]
         self.values = [(low + high) / 2 for low, high in ranges]
-        self.sums: dict[int, dict[int, int]] = {}
-        self.scales: dict[int, int] = {}
+        self.sums: dict[int, dict[int, Fraction]] = {}
         for number, (weights, constant, share) in enumerate(sides, len(ranges)):
             # The side's number is constant + sum - share * slack >= 0; the constant
             # moves into the bound.
@@ -211,9 +208,7 @@ class _Tableau:
             self.values.append(total)
             self.bounds[number] = (-constant, None)
             terms = {**weights, self.slack: -share}
-            scale = math.lcm(*(one.denominator for one in terms.values()))
-            self.scales[number] = scale
-            self.sums[number] = {i: int(w * scale) for i, w in terms.items() if w}
+            self.sums[number] = {i: w for i, w in terms.items() if w}
         self.values.append(ZERO)
 
     def repair(self) -> bool:
@@ -227,7 +222,7 @@ class _Tableau:
             entering = self._helpful(broken, is_up=gap > 0)
             if entering is None:
                 return False
-            step = gap * self.scales[broken] / self.sums[broken][entering]
+            step = gap / self.sums[broken][entering]
             self._move(entering, step)
             self._pivot(broken, entering)
 
@@ -280,7 +275,7 @@ class _Tableau:
             end = self.bounds[number][weight > 0]
             if not weight or end is None:
                 continue
-            free = (end - self.values[number]) * self.scales[number] / weight
+            free = (end - self.values[number]) / weight
             if room is None or free < room:
                 room, blocking = free, number
         assert room is not None  # the slack is at most 1
@@ -290,29 +285,20 @@ class _Tableau:
         self.values[moving] += step
         for number, terms in self.sums.items():
             if moving in terms:
-                share = Fraction(terms[moving], self.scales[number])
-                self.values[number] += share * step
+                self.values[number] += terms[moving] * step
 
     def _pivot(self, leaving: int, entering: int) -> None:
         """Express the entering variable by the leaving one, and put it in."""
-        terms, scale = self.sums.pop(leaving), self.scales.pop(leaving)
+        terms = self.sums.pop(leaving)
         own = terms.pop(entering)
-        sign = 1 if own > 0 else -1
-        solved = {i: -sign * w for i, w in terms.items()}
-        solved[leaving] = sign * scale
-        self._put(entering, solved, abs(own))
-        for number in [one for one in self.sums if entering in self.sums[one]]:
-            row = self.sums[number]
-            weight = row.pop(entering)
-            merged = {i: w * abs(own) for i, w in row.items()}
-            for i, w in solved.items():
-                merged[i] = merged.get(i, 0) + weight * w
-            self._put(number, merged, self.scales[number] * abs(own))
-
-    def _put(self, number: int, terms: dict[int, int], scale: int) -> None:
-        common = math.gcd(scale, *terms.values())
-        self.sums[number] = {i: w // common for i, w in terms.items() if w}
-        self.scales[number] = scale // common
+        way = {leaving: 1 / own, **{i: -w / own for i, w in terms.items()}}
+        for row in self.sums.values():
+            weight = row.pop(entering, ZERO)
+            for i, w in way.items() if weight else ():
+                row[i] = row.get(i, ZERO) + weight * w
+                if not row[i]:
+                    del row[i]
+        self.sums[entering] = way
 
 
 def _sides(

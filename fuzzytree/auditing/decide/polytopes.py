@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
@@ -24,12 +25,12 @@ from fuzzytree.auditing.decide.linear import (
     feasible,
     holds,
     inequalities,
-    least,
     simple,
 )
+from fuzzytree.auditing.decide.linear import least as least_value
 from fuzzytree.auditing.decide.regions import boxes, cut_side, leaf_at, regions
 from fuzzytree.model import FloatArray, FuzzyTree, Variable
-from fuzzytree.numerics import U
+from fuzzytree.numerics import U, outwards
 
 _STEPS = 2_000  # of a linear program, about
 _MOST_PARTS = 2_000  # that splits make
@@ -136,6 +137,7 @@ class Polytopes:
         The lower bound is the cost itself, or less by next to nothing.
         """
         budget = budget or Budget()
+        at = [centre[name] for name in self.inputs]
         bounds, number = self.bounds(centre, costs), itertools.count()
         queue = [(bounds[n], next(number), self.parts[n]) for n in chosen]
         heapq.heapify(queue)
@@ -146,10 +148,13 @@ class Polytopes:
             if best is not None and best.high is not None and bound > best.high:
                 break
             used = {place for row in part.sums for place in row.weights}
-            mixed = [part.sides[p] for p in sorted(used) if _is_mixed(part, p, costs)]
+            mixed = [p for p in sorted(used) if _is_mixed(part, p, costs)]
             if mixed:  # numbers, and a stand-in beside them
-                for half in _split(part, mixed[0], ZERO):
-                    heapq.heappush(queue, (bound, next(number), half))
+                place = mixed[0]
+                for half in _split(part, part.sides[place], ZERO):
+                    cost, _ = costs.nearest(half.sides[place], at[place])
+                    least = max(bound, outwards(cost)[0])
+                    heapq.heappush(queue, (least, next(number), half))
                 continue
             try:
                 budget.spend(len(part.sides))
@@ -242,7 +247,7 @@ class Polytopes:
         if point is None:
             return None
         slacks = [step / rate if rate else ZERO for rate in rates]
-        return low, _plainer(point, at, limits, part.rows, slacks)
+        return low, _plainer(point, at, sides, ball, part.rows, slacks)
 
 
 def _may_jump(costs: Costs, name: str) -> bool:
@@ -315,12 +320,13 @@ def _least(
             rows.append(Row({n: ONE, radius: -width}, high=x))
     most = [max(abs(end - at[p]) * rates[p] for end in limits[p]) for p in used]
     ranges = [*(limits[place] for place in used), (low, max(low, *most, ONE))]
-    return least(ranges, rows, radius)
+    return least_value(ranges, rows, radius)
 
 
 def _plainer(
     values: Sequence[Fraction],
     at: Sequence[Fraction],
+    sides: Sequence[DomainSide],
     limits: Sequence[tuple[Fraction, Fraction]],
     rows: Sequence[Row],
     slack: Sequence[Fraction],
@@ -330,15 +336,21 @@ def _plainer(
     `slack`: how much farther than needed a value may be, to have fewer digits.
     """
     result = list(values)
-    for place, ((low, high), x) in enumerate(zip(limits, at, strict=True)):
-        near = x
+    for place in sorted(range(len(at)), key=lambda place: not sides[place].is_whole):
+        (low, high), x = limits[place], at[place]
+        near = [x]
         if x < low:
-            near = simple(low, min(high, low + slack[place]))
+            near = [simple(low, min(high, low + slack[place]))]
         elif x > high:
-            near = simple(max(low, high - slack[place]), high)
-        other = [*result[:place], near, *result[place + 1 :]]
-        if all(holds(row, other) for row in rows if row.weights.get(place)):
-            result = other
+            near = [simple(max(low, high - slack[place]), high)]
+        if sides[place].is_whole:
+            below = Fraction(math.floor(result[place]))
+            near += [value for value in (below, below + 1) if low <= value <= high]
+        for value in near:
+            other = [*result[:place], value, *result[place + 1 :]]
+            if all(holds(row, other) for row in rows if row.weights.get(place)):
+                result = other
+                break
     return result
 
 
