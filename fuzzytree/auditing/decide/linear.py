@@ -5,11 +5,11 @@ Pivots follow Bland's rule, so that none comes back.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.auditing.decide.domain import Domain, linear_form
+from fuzzytree.auditing.decide.domain import linear_form
 from fuzzytree.model import Variable, checkpoint
 
 ZERO, ONE = Fraction(0), Fraction(1)
@@ -45,26 +45,6 @@ def row_of(
     weights, constant = linear_form(variable, number)
     low, high = ends
     return Row(weights, low - constant, high - constant, is_open_low, is_open_high)
-
-
-def inequalities(
-    domain: Domain, inputs: Sequence[str], variables: Iterable[Variable]
-) -> tuple[list[Range], list[Row]]:
-    """Return a box: the range of each input; limits of combinations, and open ends."""
-    number = {name: place for place, name in enumerate(inputs)}
-    ranges: list[Range] = []
-    rows: list[Row] = []
-    for name in inputs:
-        side = domain.side(name)
-        assert side is not None  # checked when the rules were arranged
-        ranges.append(side.ends)
-        if side.is_open:
-            rows.append(Row({number[name]: ONE}, side.ends[0], is_open_low=True))
-    for variable in variables:
-        side = domain.side(variable.name)
-        if variable.parts and side is not None:
-            rows.append(row_of(variable, number, side.ends, is_open_low=side.is_open))
-    return ranges, rows
 
 
 def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | None:

@@ -24,7 +24,7 @@ from fuzzytree.auditing.decide.linear import (
     Row,
     feasible,
     holds,
-    inequalities,
+    row_of,
     simple,
 )
 from fuzzytree.auditing.decide.linear import least as least_value
@@ -54,9 +54,19 @@ def polytope_of(
     box: Domain, inputs: Sequence[str], variables: Iterable[Variable]
 ) -> Polytope:
     """Return a box of inputs and sums as a polytope."""
-    sides = {one.variable: one for one in box.sides}
-    _, rows = inequalities(box, inputs, variables)
-    return Polytope(tuple(sides[name] for name in inputs), tuple(rows))
+    every = {side.variable: side for side in box.sides}
+    sides = tuple(every[name] for name in inputs)
+    number = {name: place for place, name in enumerate(inputs)}
+    rows = [
+        Row({place: ONE}, side.ends[0], is_open_low=True)
+        for place, side in enumerate(sides)
+        if side.is_open
+    ]
+    for variable in variables:
+        if variable.parts and variable.name in every:
+            side = every[variable.name]
+            rows.append(row_of(variable, number, side.ends, is_open_low=side.is_open))
+    return Polytope(sides, tuple(rows))
 
 
 class Polytopes:
