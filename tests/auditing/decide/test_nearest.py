@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import sys
 from fractions import Fraction
 
 import pytest
@@ -114,6 +115,20 @@ def test_no_cheaper_change_of_rules_exists(
     for _ in range(3):
         row = draw_row(domain, rules.inputs, chance)
         check(base, nearest(base, row), row, chance)
+
+
+@pytest.mark.parametrize("seed", some_seeds(4))
+def test_sums_and_curves_are_bounded_without_a_solver(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "z3", None)
+    for kind in ("steps", "curves"):
+        rules, domain = random_base(seed, kind, "product", 2)
+        base, chance = Base.of(rules, domain), random.Random(seed)
+        row = draw_row(domain, rules.inputs, chance)
+        result = nearest(base, row)
+        assert result.is_none or result.high == 0 or result.low > 0
+        check(base, result, row, chance)
 
 
 def valued(tree: FuzzyTree, seed: int) -> tuple[FuzzyTree, Domain]:
