@@ -51,9 +51,9 @@ def learnt() -> Iterator[Model]:
 
 
 def generated() -> Iterator[Model]:
-    """Yield 200 rule bases of six rules on two inputs."""
+    """Yield 40 rule bases of six rules on two inputs."""
     kinds: tuple[Kind, ...] = ("points", "band", "lr", "mixed")
-    for seed in range(25):
+    for seed in range(5):
         for kind in kinds:
             yield random_base(seed, 6, 2, "minimum", kind, odd=0.3, shared=0.4)
             yield random_base(seed, 6, 2, "product", kind, odd=0.3, shared=0.4)
