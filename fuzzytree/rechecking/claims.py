@@ -383,7 +383,8 @@ def no_gap(case: Case, gaps: Iterable[Answer] = ()) -> Statement:
         if side.low == side.high or case.model.variables[name].categories
     )
     formulas = [case.script.zero(rule, case.rules, points) for rule in case.rules.rules]
-    text = "some rule fires on each part with a width" + (" but the gaps" if gaps else "")
+    text = "some rule fires on each part with a width"
+    text += " but the gaps listed" if gaps else ""
     for gap in gaps:
         beyond = (f for span in gap.region for f in _beyond(case, span, math.inf))
         formulas.append(any_of(beyond))

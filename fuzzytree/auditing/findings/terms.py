@@ -44,6 +44,7 @@ from fuzzytree.rechecking import side_values
 
 _NEAR: Final = Fraction(1, 10**9)  # bounds of a height that are shown as one number
 _INEXACT: Final = "curves are known between functions of lines"
+_MOST_BITS: Final = 4_000  # of a fraction that is written out beside its double
 
 
 class VariableRange(NamedTuple):
@@ -106,7 +107,8 @@ def ranges(subject: Subject) -> tuple[VariableRange, ...]:
 
 def measure(name: str, value: Bounds) -> Measure:
     """Return a number between bounds as a measure: their middle."""
-    exact = str(value.low) if value.low == value.high else None
+    is_short = value.low.denominator.bit_length() <= _MOST_BITS
+    exact = str(value.low) if value.low == value.high and is_short else None
     return Measure(name, float((value.low + value.high) / 2), exact)
 
 
