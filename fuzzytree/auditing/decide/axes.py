@@ -114,10 +114,12 @@ class Axis:
             axis.is_open, axis.is_whole = self.is_open, self.is_whole
             axis.values, axis.extra = self.values, self.extra
             own = {
-                one: users for one, users in self.literals.items() if one in literals
+                literal: users
+                for literal, users in self.literals.items()
+                if literal in literals
             }
             axis.literals = own
-            axis.parts = {one: self.parts[one] for one in own}
+            axis.parts = {literal: self.parts[literal] for literal in own}
             self._restricted[literals] = axis
         return self._restricted[literals]
 
@@ -166,9 +168,11 @@ class Axis:
                 both = _coarser(both, self.most_pieces)
                 if literal.negated:
                     both = both.negated()
-                low = _moved(both.lower, literal)
+                low = _literal_lines(both.lower, literal)
                 lower.append(low)
-                upper.append(low if both.is_exact else _moved(both.upper, literal))
+                upper.append(
+                    low if both.is_exact else _literal_lines(both.upper, literal)
+                )
             result[literal] = self.kept[literal] = lower, upper
         return result
 
@@ -199,18 +203,18 @@ class Axis:
     @cached_property
     def bounds(self) -> dict[Literal, Between]:
         """Each literal between two functions of lines on the common `knots`."""
-        return self._arranged[1]
+        return self._knots_and_bounds[1]
 
     @cached_property
     def knots(self) -> tuple[Fraction, ...]:
         """Where literals bend, jump or cross; or all values, if it has no range."""
-        return self._arranged[0]
+        return self._knots_and_bounds[0]
 
     @cached_property
     def bends(self) -> list[Fraction]:
         """Where a function of a literal bends or jumps, and the ends, in order."""
         ends = self.low, self.high, self.least, self.largest
-        return _sorted([*ends, *(x for one in self._distinct for x in one.x)])
+        return _in_order([*ends, *(x for line in self._distinct for x in line.x)])
 
     @cached_property
     def stretches(self) -> Stretches:
@@ -223,7 +227,7 @@ class Axis:
         Raises:
             OutOfStepsError: If the budget is spent.
         """
-        if "_arranged" not in vars(self):
+        if "_knots_and_bounds" not in vars(self):
             count, size = len(self._distinct), len(self.bends)
             budget.spend(count * size * (10 + (0 if self.values else count // 4)))
 
@@ -232,34 +236,36 @@ class Axis:
         """Whether all crossings are knots, as levels need; not with too many lines."""
         if self.values:
             return True
-        count = len({x for one in self._distinct for x in one.x})
+        count = len({x for line in self._distinct for x in line.x})
         return len(self._distinct) ** 2 * count <= _MOST_CROSSINGS
 
     @cached_property
     def _distinct(self) -> list[Lines]:
-        every = (one for sides in self.parts.values() for side in sides for one in side)
+        every = (
+            line for sides in self.parts.values() for side in sides for line in side
+        )
         return _once(every)
 
     @cached_property
-    def _arranged(self) -> tuple[tuple[Fraction, ...], dict[Literal, Between]]:
+    def _knots_and_bounds(self) -> tuple[tuple[Fraction, ...], dict[Literal, Between]]:
         xs = self.bends
         if self.values:
             xs = [*self.values]
-            lines = {id(one): _sampled(one, xs) for one in self._distinct}
+            lines = {id(line): _at_values(line, xs) for line in self._distinct}
         else:
-            lines = {id(one): refined(one, xs) for one in self._distinct}
+            lines = {id(line): refined(line, xs) for line in self._distinct}
             if self.is_crossed:
                 more = [*_crossings([*lines.values()])]
                 if more:
-                    xs = _sorted([*xs, *more])
-                    lines = {name: refined(one, xs) for name, one in lines.items()}
+                    xs = _in_order([*xs, *more])
+                    lines = {name: refined(line, xs) for name, line in lines.items()}
         result: dict[Literal, Between] = {}
         for literal, (lower, upper) in self.parts.items():
             pick = min if literal.negated else max
-            low = _extreme([lines[id(one)] for one in lower], pick)
+            low = _extreme([lines[id(line)] for line in lower], pick)
             is_exact = all(a is b for a, b in zip(lower, upper, strict=True))
             high = (
-                low if is_exact else _extreme([lines[id(one)] for one in upper], pick)
+                low if is_exact else _extreme([lines[id(line)] for line in upper], pick)
             )
             result[literal] = Between(low, high)
         return tuple(xs), result
@@ -269,29 +275,29 @@ class Axis:
     @cached_property
     def levels(self) -> tuple[Fraction, ...]:
         """The critical levels, in order."""
-        lines = _once(one for two in self.bounds.values() for one in two)
-        values = [value_at(one, x) for x in self.extra for one in lines]
+        lines = _once(line for both in self.bounds.values() for line in both)
+        values = [value_at(line, x) for x in self.extra for line in lines]
         last = len(self.knots) - 1
         for k in range(last + 1):
             if self.values:
-                values += [one.at[k] for one in lines]
+                values += [line.at[k] for line in lines]
                 continue
             before, after = max(k - 1, 0), min(k, last - 1)
             around = [
-                (one.at[k], *one.before[before:k], *one.after[k : k + 1])
-                for one in lines
+                (line.at[k], *line.before[before:k], *line.after[k : k + 1])
+                for line in lines
             ]
-            if k in (0, last) or any(len({*each}) > 1 for each in around):
-                values += [v for each in around for v in each]
+            if k in (0, last) or any(len({*ends}) > 1 for ends in around):
+                values += [v for ends in around for v in ends]
                 continue
             a, b = self.knots[k] - self.knots[before], self.knots[k + 1] - self.knots[k]
             seen: dict[Fraction, int] = {}
-            for one, (v, *_) in zip(lines, around, strict=True):
-                p, q = one.after[before], one.before[after]
+            for line, (v, *_) in zip(lines, around, strict=True):
+                p, q = line.after[before], line.before[after]
                 is_bent = p != v if v == q else (v - p) * b != (q - v) * a
                 seen[v] = seen.get(v, 0) + 1 + is_bent
             values += [v for v, count in seen.items() if count > 1]
-        return tuple(_sorted(values))
+        return tuple(_in_order(values))
 
     def place(self, level: Fraction) -> int:
         """Return the number of a level: odd on a critical one, even between two."""
@@ -331,7 +337,7 @@ class Axis:
         ranks = self._ranks
         rank = ranks.of(level)
         for x in self.extra:
-            values = [value_at(one, x) for one in ranks.lines]
+            values = [value_at(line, x) for line in ranks.lines]
             states = [(v > level) - (v < level) for v in values]
             yield Cell(self._masks(states), x, is_wide=False)
         for column, places in _distinct(np.sign(ranks.at - rank)):
@@ -392,8 +398,8 @@ class Axis:
 
     @cached_property
     def _ranks(self) -> _Ranks:
-        both = [self.bounds[literal] for literal in self.literals]
-        lines = [one.lower for one in both] + [one.upper for one in both]
+        bounds = [self.bounds[literal] for literal in self.literals]
+        lines = [pair.lower for pair in bounds] + [pair.upper for pair in bounds]
         return _Ranks(lines)
 
     def _masks(self, states: Sequence[int]) -> Masks:
@@ -414,8 +420,8 @@ class _Ranks:
 
     def __init__(self, lines: Sequence[Lines]) -> None:
         self.lines = lines
-        every = [v for side in (1, 2, 3) for one in lines for v in one[side]]
-        self.values, places = _ranked(every)
+        every = [v for side in (1, 2, 3) for line in lines for v in line[side]]
+        self.values, places = _values_and_places(every)
         ranks = 2 * np.array(places, dtype=np.int64) + 1
         count, size = len(lines), len(lines[0].x)
         ends = count * size, count * (2 * size - 1)
@@ -429,7 +435,7 @@ class _Ranks:
         return 2 * at + (at < len(self.values) and self.values[at] == level)
 
 
-def _ranked(values: Sequence[Fraction]) -> tuple[list[Fraction], list[int]]:
+def _values_and_places(values: Sequence[Fraction]) -> tuple[list[Fraction], list[int]]:
     """Return the different values in order, and the place of each value among them."""
     near = [float(v) for v in values]
     order = sorted(range(len(values)), key=near.__getitem__)
@@ -446,13 +452,13 @@ def _ranked(values: Sequence[Fraction]) -> tuple[list[Fraction], list[int]]:
     return result, places
 
 
-def _sorted(values: Sequence[Fraction]) -> list[Fraction]:
+def _in_order(values: Sequence[Fraction]) -> list[Fraction]:
     """Return the different values in order."""
-    return _ranked(values)[0]
+    return _values_and_places(values)[0]
 
 
 def _once(lines: Iterable[Lines]) -> list[Lines]:
-    return [*{id(one): one for one in lines}.values()]
+    return [*{id(line): line for line in lines}.values()]
 
 
 def _distinct(columns: IntArray) -> Iterator[tuple[list[int], IntArray]]:
@@ -475,8 +481,8 @@ def function_lines(
     if isinstance(function, Hedged) and not function.hedges:
         inner = lines_of(function.function, low, high)
         height = Fraction(function.height)
-        lower = _scaled(inner.lower, height)
-        upper = lower if inner.is_exact else _scaled(inner.upper, height)
+        lower = _times(inner.lower, height)
+        upper = lower if inner.is_exact else _times(inner.upper, height)
         return Between(lower, upper)
     return lines_of(function, low, high)
 
@@ -498,28 +504,28 @@ def degree_bounds(
 def literal_bounds(literal: Literal, x: Fraction) -> tuple[Fraction, Fraction]:
     """Return between which fractions the degree of a literal lies."""
     every = [degree_bounds(function, x) for function in literal.functions]
-    low, high = max(one[0] for one in every), max(one[1] for one in every)
+    low, high = max(low for low, _ in every), max(high for _, high in every)
     if literal.negated:
         low, high = 1 - high, 1 - low
     by = literal.lowered
     return literal.scale * low - by, literal.scale * high - by
 
 
-def _scaled(lines: Lines, by: Fraction) -> Lines:
+def _times(lines: Lines, by: Fraction) -> Lines:
     if by == ONE:
         return lines
     parts = (tuple(v * by for v in of) for of in lines[1:])
     return Lines(lines.x, *parts)
 
 
-def _moved(lines: Lines, literal: Literal) -> Lines:
-    lines = _scaled(lines, literal.scale)
+def _literal_lines(lines: Lines, literal: Literal) -> Lines:
+    lines = _times(lines, literal.scale)
     if not literal.lowered:
         return lines
     return lines.lowered(literal.lowered)
 
 
-def _sampled(lines: Lines, xs: Sequence[Fraction]) -> Lines:
+def _at_values(lines: Lines, xs: Sequence[Fraction]) -> Lines:
     """Return lines at single values."""
     at = tuple(value_at(lines, x) for x in xs)
     return Lines(tuple(xs), at, at[:-1], at[1:])
@@ -532,7 +538,7 @@ def _extreme(
     if len(every) == 1:
         return every[0]
     parts = [
-        tuple(pick(values) for values in zip(*(one[n] for one in every), strict=True))
+        tuple(pick(values) for values in zip(*(line[n] for line in every), strict=True))
         for n in (1, 2, 3)
     ]
     return Lines(every[0].x, *parts)
@@ -542,7 +548,7 @@ def _crossings(every: Sequence[Lines]) -> Iterator[Fraction]:
     """Yield where two lines cross within a piece."""
     xs = every[0].x if every else ()
     for k, (a, b) in enumerate(itertools.pairwise(xs)):
-        ends = [*dict.fromkeys((one.after[k], one.before[k]) for one in every)]
+        ends = [*dict.fromkeys((line.after[k], line.before[k]) for line in every)]
         values = sorted({v for pair in ends for v in pair})
         rank = {v: n for n, v in enumerate(values)}
         ranked = sorted((rank[p], rank[q], p, q) for p, q in ends)
