@@ -18,7 +18,7 @@ from fuzzytree.auditing.decide.axes import (
     Axis,
     literal_bounds,
 )
-from fuzzytree.auditing.decide.domain import Domain, combined
+from fuzzytree.auditing.decide.domain import Domain, combination
 from fuzzytree.auditing.decide.lines import Lines
 from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, Literal, rules_of
 from fuzzytree.model import BoolArray, Document, FloatArray, FuzzySystem, Variable
@@ -69,11 +69,11 @@ class Base:
         for variable in variables.values():
             if not variable.parts:
                 self.inputs[variable.name] = self._input(variable)
-        asked = {name for rule in self.rules for name, _ in rule.literals}
+        names = {name for rule in self.rules for name, _ in rule.literals}
         self.axes: dict[str, Axis] = {}
         self.is_empty = False
         for name, variable in variables.items():
-            if name in asked or (domain.side(name) is not None and variable.parts):
+            if name in names or (domain.side(name) is not None and variable.parts):
                 self.axes[name] = self._axis(name, variable)
         for place, rule in enumerate(self.rules):
             for name, literal in rule.literals:
@@ -119,7 +119,9 @@ class Base:
                         names[variable.name] += "'"
                 variables.setdefault(names[variable.name], variable)
             for rule in rules_of(model).rules:
-                literals = tuple((names[name], one) for name, one in rule.literals)
+                literals = tuple(
+                    (names[name], literal) for name, literal in rule.literals
+                )
                 rules.append(rule._replace(literals=literals, model=place))
         return cls(rules, variables, domain, seed=seed)
 
@@ -131,8 +133,10 @@ class Base:
             if name in result.axes:
                 result.axes[name].kept = axis.kept
         vars(result)["samples"] = self.samples
-        added = result._sampled(range(self.count, len(rules)))
-        vars(result)["sampled"] = np.concatenate([self.sampled, added])
+        added = result._strengths_of_samples(range(self.count, len(rules)))
+        vars(result)["sample_strengths"] = np.concatenate(
+            [self.sample_strengths, added]
+        )
         return result
 
     def on(self, domain: Domain) -> Base:
@@ -172,7 +176,7 @@ class Base:
             return self.inputs[variable.name]
         places = {of: n for n, of in enumerate(self.inputs)}
         names = [*self.inputs]
-        by_place, constant = combined(variable.parts, places)
+        by_place, constant = combination(variable.parts, places)
         weights = {names[place]: weight for place, weight in by_place.items()}
         low = high = constant
         for of, weight in weights.items():
@@ -210,7 +214,7 @@ class Base:
         return sum(len(rule.literals) for rule in self.rules)
 
     @cached_property
-    def used(self) -> tuple[Axis, ...]:
+    def axes_in_use(self) -> tuple[Axis, ...]:
         """The axes that rules ask."""
         return tuple(axis for axis in self.axes.values() if axis.literals)
 
@@ -310,7 +314,7 @@ class Base:
                 values = np.array([float(v) for v in axis.values])
                 columns.append(chance.choice(values, size=SAMPLES))
                 continue
-            drawn = _drawn(axis, chance)
+            drawn = _draw(axis, chance)
             places = self._places(name, axis)
             if len(places):
                 is_drawn = chance.random(SAMPLES) < 0.5
@@ -343,11 +347,11 @@ class Base:
         return {name: Fraction(float(column[number])) for name, column in columns}
 
     @cached_property
-    def sampled(self) -> FloatArray:
+    def sample_strengths(self) -> FloatArray:
         """The strengths at sampled points in doubles, shape (rules, points)."""
-        return self._sampled(range(self.count))
+        return self._strengths_of_samples(range(self.count))
 
-    def _sampled(self, of: Sequence[int]) -> FloatArray:
+    def _strengths_of_samples(self, of: Sequence[int]) -> FloatArray:
         columns = dict(zip(self.inputs, self.samples, strict=True))
         result = self.in_doubles(columns, of=of)
         if self.is_coupled:
@@ -380,8 +384,8 @@ class Base:
                         values[name] = self._in_doubles(self.axes[name], columns, size)
                     pick = np.minimum if literal.negated else np.maximum
                     parts = self.axes[name].parts[literal][is_upper]
-                    each = [lines_at(lines, values[name]) for lines in parts]
-                    degrees[key] = functools.reduce(pick, each)
+                    heights = [lines_at(lines, values[name]) for lines in parts]
+                    degrees[key] = functools.reduce(pick, heights)
                 join(strength, degrees[key], out=strength)
         return result
 
@@ -402,7 +406,7 @@ class Base:
         return inside
 
 
-def _drawn(axis: Axis, chance: np.random.Generator) -> FloatArray:
+def _draw(axis: Axis, chance: np.random.Generator) -> FloatArray:
     """Return doubles within a range, of few digits."""
     low, high = float(axis.low), float(axis.high)
     digits = 3 - math.floor(math.log10(high - low)) if high > low else 0

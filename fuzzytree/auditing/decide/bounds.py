@@ -23,26 +23,26 @@ class Bounds(NamedTuple):
 
     def plus(self, other: Bounds) -> Bounds:
         """Return bounds of the sum."""
-        return _rounded(self.low + other.low, self.high + other.high)
+        return _outwards(self.low + other.low, self.high + other.high)
 
     def times(self, other: Bounds) -> Bounds:
         """Return bounds of the product, where 0 times infinity is 0."""
         products = [a * b for a in self for b in other]
         products = [np.where(np.isnan(product), 0.0, product) for product in products]
-        return _rounded(np.minimum.reduce(products), np.maximum.reduce(products))
+        return _outwards(np.minimum.reduce(products), np.maximum.reduce(products))
 
     def over(self, divisor: Bounds) -> Bounds:
         """Return bounds of the quotient by something that is never negative."""
-        return self.times(_rounded(1.0 / divisor.high, 1.0 / divisor.low))
+        return self.times(_outwards(1.0 / divisor.high, 1.0 / divisor.low))
 
     def total(self) -> Bounds:
         """Return bounds of the sum over all summands."""
         slack = len(self.low) * _UNIT
         low = self.low.sum(0) - slack * np.abs(self.low).sum(0)
-        return _rounded(low, self.high.sum(0) + slack * np.abs(self.high).sum(0))
+        return _outwards(low, self.high.sum(0) + slack * np.abs(self.high).sum(0))
 
 
-def _rounded(low: FloatArray, high: FloatArray) -> Bounds:
+def _outwards(low: FloatArray, high: FloatArray) -> Bounds:
     """Return bounds moved outwards; of what is not known, infinite ones."""
     low, high = low - _UNIT * np.abs(low), high + _UNIT * np.abs(high)
     return Bounds(
@@ -55,7 +55,7 @@ def exact(values: FloatArray) -> Bounds:
     return Bounds(values, values)
 
 
-def stacked(parts: Sequence[Bounds]) -> Bounds:
+def stack(parts: Sequence[Bounds]) -> Bounds:
     """Return bounds of several numbers as summands."""
     return Bounds(*map(np.array, zip(*parts, strict=True)))
 
@@ -81,13 +81,13 @@ def _least_average(values: FloatArray, weights: Bounds) -> FloatArray:
     order = np.argsort(values, axis=0, kind="stable")
     x, low, high = (np.take_along_axis(of, order, 0) for of in (values, *weights))
     with np.errstate(divide="ignore", invalid="ignore"):
-        sums = _parted(high, low)
-        averages = np.where(sums > 0.0, _parted(x * high, x * low) / sums, np.inf)
+        sums = _split_sums(high, low)
+        averages = np.where(sums > 0.0, _split_sums(x * high, x * low) / sums, np.inf)
     slack = 2 * (len(values) + 4) * _UNIT * np.abs(values).max(0)
     return np.array(averages.min(0) - slack)
 
 
-def _parted(first: FloatArray, second: FloatArray) -> FloatArray:
+def _split_sums(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the sums of the first entries up to each, and of the second behind it."""
     rest = np.zeros_like(second)
     rest[:-1] = second[:0:-1].cumsum(0)[::-1]
@@ -115,7 +115,7 @@ def largest(changes: Sequence[Change]) -> Change:
     Its slope is that of a number that may be larger than all others, or of the one
     that is surely as large as the rest.
     """
-    values, slopes = (stacked(parts) for parts in zip(*changes, strict=True))
+    values, slopes = (stack(parts) for parts in zip(*changes, strict=True))
     low = values.low.max(0)
     may_be = values.high > low
     np.put_along_axis(may_be, values.low.argmax(0)[None], values=True, axis=0)

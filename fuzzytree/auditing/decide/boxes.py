@@ -59,8 +59,8 @@ class Boxes:
     @classmethod
     def whole(cls, base: Base) -> Boxes:
         """Return the whole domain as the only box, but for stand-ins beside ranges."""
-        stretches = {axis.name: axis.stretches for axis in base.used}
-        high = np.array([[float(each.last) for each in stretches.values()]])
+        stretches = {axis.name: axis.stretches for axis in base.axes_in_use}
+        high = np.array([[float(stretch.last) for stretch in stretches.values()]])
         return cls(base, stretches, np.zeros_like(high), high)
 
     def degree(self, name: str, literal: Literal) -> tuple[FloatArray, FloatArray]:
@@ -94,13 +94,13 @@ class Boxes:
         self, rule: int, side: Side, without: frozenset[Factor] = frozenset()
     ) -> FloatArray:
         """Return bounds of a rule's strength on boxes: from below 0, from above 1."""
-        one = self.base.rules[rule]
-        result = np.full(len(self.low), float(one.factor))
-        for name, literal in one.literals:
+        own = self.base.rules[rule]
+        result = np.full(len(self.low), float(own.factor))
+        for name, literal in own.literals:
             if (name, literal) in without:
                 continue
             degree = self.degree(name, literal)[side]
-            if one.norm == "product":
+            if own.norm == "product":
                 result = result * degree
             else:
                 result = np.minimum(result, degree)
@@ -126,7 +126,7 @@ def search_boxes(
     Raises:
         OutOfStepsError: If the budget is spent.
     """
-    if base.is_coupled or any(axis.extra for axis in base.used):
+    if base.is_coupled or any(axis.extra for axis in base.axes_in_use):
         return Open("axes share inputs, or have a value beside their range", "FTD04")
     own = Budget(steps, budget)
     whole = Boxes.whole(base)
@@ -155,7 +155,7 @@ def search_boxes(
         if slivers > _MOST_SLIVERS:
             return Open("they touch on too many small boxes")
         if len(boxes):
-            boxes = _halved(boxes, width, [*stretches.values()])
+            boxes = _halve(boxes, width, [*stretches.values()])
     return (
         Open(f"{slivers} small boxes are left") if slivers else Proved(f"{seen} boxes")
     )
@@ -178,12 +178,12 @@ def _middles(
     return result
 
 
-def _halved(
+def _halve(
     boxes: FloatArray, width: FloatArray, stretches: list[Stretches]
 ) -> FloatArray:
     """Return both halves of boxes, which are halved where they are longest."""
     rows, longest = np.arange(len(boxes)), width.argmax(axis=1)
-    has_values = np.array([bool(one.axis.values) for one in stretches])[longest]
+    has_values = np.array([bool(stretch.axis.values) for stretch in stretches])[longest]
     low, high = boxes[rows, 0, longest], boxes[rows, 1, longest]
     middle = (low + high) / 2
     middle = np.where(high - low > 1.5, np.round(middle), middle)
@@ -217,17 +217,17 @@ def by_boxes(
         out = np.zeros(len(boxes.low), dtype=bool)
         for i in question.reach:
             shared: frozenset[Factor] = frozenset()
-            one, other = base.rules[i], base.rules[j]
-            if one.norm == other.norm == "product" and not (twice[i] or twice[j]):
+            own, rival = base.rules[i], base.rules[j]
+            if own.norm == rival.norm == "product" and not (twice[i] or twice[j]):
                 shared = factors[i] & factors[j]
             mine = boxes.strength(i, 1, shared)
             theirs = boxes.strength(j, 0, shared)
             out |= mine < theirs * least
             if j in question.rivals:
-                is_never = one.norm == other.norm and one.factor <= other.factor
+                is_never = own.norm == rival.norm and own.factor <= rival.factor
                 if is_never and factors[j] <= factors[i] and not twice[j]:
                     out |= True
-                out |= (theirs >= 1.0) & (mine <= 1.0) & (one.factor <= 1)
+                out |= (theirs >= 1.0) & (mine <= 1.0) & (own.factor <= 1)
         return out
 
     def is_excluded(boxes: Boxes) -> BoolArray:

@@ -107,24 +107,24 @@ class Claims:
         """Return how far a rule leads before all of other classes, at most."""
         result = Lead(ZERO, ONE, None)
         rivals = self.others(i)
-        drawn = self.base.sampled
+        drawn = self.base.sample_strengths
         most = drawn[[*rivals]].max(axis=0) if rivals else 0.0
         for number in np.argsort(most - drawn[i], kind="stable")[:_LOOKS].tolist():
             if self.base.contains(self.base.sample(number)):
                 result = self._better(i, self.base.sample(number), result)
             if result.low >= enough:
                 return result
-        asked, steps = enough, _NARROWER
+        by, steps = enough, _NARROWER
         while steps and result.low < enough:
-            answer = self.leads(i, asked, budget)
+            answer = self.leads(i, by, budget)
             if isinstance(answer, Point):
                 result = self._better(i, answer.values, result)
             elif isinstance(answer, Proved):
-                result = result._replace(high=asked)
+                result = result._replace(high=by)
             else:
-                result = result._replace(is_open=asked == enough)
+                result = result._replace(is_open=by == enough)
                 break
-            asked, steps = (result.low + result.high) / 2, steps - 1
+            by, steps = (result.low + result.high) / 2, steps - 1
         return result
 
     def _better(self, i: int, values: Any, lead: Lead) -> Lead:
@@ -144,8 +144,8 @@ class Claims:
 
         if rule.norm == "minimum":
             literals = tuple(
-                (name, replace(one, lowered=one.lowered + by))
-                for name, one in rule.literals
+                (name, replace(literal, lowered=literal.lowered + by))
+                for name, literal in rule.literals
             )
             lower = rule._replace(literals=literals, factor=rule.factor - by)
             question = Question((base.count,), weak=rivals)
@@ -163,9 +163,9 @@ class Claims:
             number = z3.RealVal(str(by), v[i].ctx)
             return z3.And(v[i] >= number, *(v[i] - number >= v[j] for j in rivals))
 
-        return self._searched(is_excluded, formula, (i, *rivals), holds, budget)
+        return self._search(is_excluded, formula, (i, *rivals), holds, budget)
 
-    def _searched(
+    def _search(
         self,
         is_excluded: Callable[[Boxes], BoolArray],
         formula: Callable[[Sequence[Any], Any], Any],
@@ -182,10 +182,10 @@ class Claims:
                 lambda own: search_boxes(base.fine, is_excluded, holds, own),
             )
         if isinstance(answer, Open):
-            return self._solved(formula, rules, holds, budget, answer)
+            return self._solve(formula, rules, holds, budget, answer)
         return answer
 
-    def _solved(
+    def _solve(
         self,
         formula: Callable[[Sequence[Any], Any], Any],
         rules: Sequence[int],
@@ -206,7 +206,7 @@ class Claims:
 
     # --- what changes without a rule, or without a proposition
 
-    def needed(self, i: int, budget: Budget) -> Answer:
+    def matters(self, i: int, budget: Budget) -> Answer:
         """Return whether a decision changes without a rule; `Proved`: none does."""
         return self.changes(i, i, self.same(i), self.others(i), budget)
 
@@ -249,7 +249,7 @@ class Claims:
         def holds(values: dict[str, Fraction]) -> bool:
             return holds_at(*base.strengths(values, (i, *own, *rest)))
 
-        drawn = self._drawn_change(i, own, rest, holds_at, budget)
+        drawn = self._change_at_samples(i, own, rest, holds_at, budget)
         if drawn is not None:
             return drawn
         question = Question((i,), (*before, *strict), (*behind, *level))
@@ -283,10 +283,10 @@ class Claims:
         rules = (i, *own, *rest)
         if base.is_lattice and base.is_exact:
             last = Open("no single level decides it")
-            return self._solved(formula, rules, holds, budget, last)
-        return self._searched(is_excluded, formula, rules, holds, budget)
+            return self._solve(formula, rules, holds, budget, last)
+        return self._search(is_excluded, formula, rules, holds, budget)
 
-    def _drawn_change(
+    def _change_at_samples(
         self,
         i: int,
         own: Sequence[int],
@@ -294,7 +294,7 @@ class Claims:
         holds: Callable[[Sequence[Fraction], Sequence[Fraction]], bool],
         budget: Budget,
     ) -> Point | None:
-        drawn = self.base.sampled
+        drawn = self.base.sample_strengths
         size = drawn.shape[1]
         most = self._most(rest, size)
         mine = self._most(own, size)
@@ -319,7 +319,7 @@ class Claims:
     def _most(self, rules: Sequence[int], size: int) -> FloatArray:
         result: FloatArray = np.zeros(size)
         if rules:
-            result = self.base.sampled[[*rules]].max(axis=0)
+            result = self.base.sample_strengths[[*rules]].max(axis=0)
         return result
 
     def below(self, level: Fraction, budget: Budget) -> Answer:
@@ -334,12 +334,12 @@ class Claims:
         question = Question((i,), weak=(j,)) if is_tied else Question((i,), (j,))
         return self.ask(question, budget)
 
-    def drawn_above(self, budget: Budget) -> BoolArray:
+    def above_at_samples(self, budget: Budget) -> BoolArray:
         """Return of which pairs drawn points show that the first rule is stronger."""
         base, count = self.base, self.base.count
         result = np.zeros((count, count), dtype=bool)
         size = max(_MOST_COMPARED // max(count, 1) ** 2, 64)
-        drawn = base.sampled[:, :size]
+        drawn = base.sample_strengths[:, :size]
         first = np.zeros((count, count), dtype=np.int64)
         left = np.zeros((count, count), dtype=bool)
         for i in range(count):
@@ -375,5 +375,5 @@ def _winner(strengths: Sequence[Fraction], rules: Sequence[tuple[int, int]]) -> 
 
     `rules`: each rule, and where it stands.
     """
-    best = max(rules, key=lambda one: (strengths[one[0]], -one[1]), default=(-1, 0))[0]
+    best, _ = max(rules, key=lambda at: (strengths[at[0]], -at[1]), default=(-1, 0))
     return best if best >= 0 and strengths[best] > 0 else -1

@@ -45,7 +45,9 @@ _FLAT = 1e-12  # no box is halved where degrees vary less
 _PART = 0.5  # of the steps, for the first of two methods
 
 
-def decided(base: Base, point: Mapping[str, Fraction]) -> tuple[str | None, int | None]:
+def decision(
+    base: Base, point: Mapping[str, Fraction]
+) -> tuple[str | None, int | None]:
     """Return the class of the first of the strongest rules, and its position.
 
     Where degrees are no fractions, the lower bounds of strengths decide.
@@ -82,7 +84,7 @@ class Contest:
 
     def accepts(self, point: Mapping[str, Fraction]) -> bool:
         """Return whether a point of the domain is decided as is sought, exactly."""
-        return self.base.contains(point) and self.counts(decided(self.base, point)[0])
+        return self.base.contains(point) and self.counts(decision(self.base, point)[0])
 
     def ask(self, domain: Domain, budget: Budget) -> Answer:
         """Return a point of a part of the domain that is of the kind, if there is one.
@@ -163,7 +165,7 @@ class Contest:
             on_axes, is_inside = inputs.on_axes(chosen, domain)
             is_left = is_inside & ~self._is_clear(on_axes)
             vary, chosen = inputs.vary(on_axes, chosen)[is_left], chosen[is_left]
-            middles = inputs.rounded(chosen.mean(axis=1))
+            middles = inputs.snap(chosen.mean(axis=1))
             lead = self._lead(middles, domain)
             order = np.argsort(-lead, kind="stable")[:_LOOKS]
             for k in order[lead[order] > 0.0]:
@@ -354,7 +356,7 @@ class _Inputs:
             result |= (at == n) & np.isin(places, jumps)
         return result
 
-    def rounded(self, places: FloatArray) -> FloatArray:
+    def snap(self, places: FloatArray) -> FloatArray:
         """Return places with those of single values at one of them."""
         return np.where(self.has_values, np.round(places), places)
 

@@ -81,7 +81,7 @@ class Costs:
             raise ValueError(f"{unknown[0]!r} is no input; the inputs are {names}")
         if any(cost <= 0 for cost in given.values()):
             raise ValueError("a change must cost more than 0; fix inputs that stay")
-        self.sides = {one.variable: one for one in domain.sides}
+        self.sides = {side.variable: side for side in domain.sides}
         self.inputs, self.fixed = tuple(inputs), frozenset(fixed)
         self.rate: dict[str, Fraction] = {}
         self.whole: dict[str, Fraction] = {}

@@ -54,7 +54,7 @@ def gap(base: Base, budget: Budget, beside: Sequence[Sides] = ()) -> Answer:
         return Proved("the domain has no point")
     fine = base.fine
     if base.is_coupled:
-        return within(budget, lambda own: _coupled_gap(fine, beside, own))
+        return within(budget, lambda own: _gap_by_solver(fine, beside, own))
     return within(budget, lambda own: _gap(fine, beside, own))
 
 
@@ -86,7 +86,7 @@ class _Walk:
     ) -> None:
         self.base, self.every = base, (1 << base.count + len(beside)) - 1
         self.options: list[tuple[str, dict[int, Fraction]]] = []
-        names = dict.fromkeys(axis.name for axis in base.used)
+        names = dict.fromkeys(axis.name for axis in base.axes_in_use)
         names |= dict.fromkeys(name for sides in beside for name in sides)
         for name in names:
             axis = base.axes[name]
@@ -133,7 +133,7 @@ class _Walk:
         return {name: masks[mask] for (name, masks), mask in pairs}
 
 
-def _coupled_gap(base: Base, beside: Sequence[Sides], budget: Budget) -> Answer:
+def _gap_by_solver(base: Base, beside: Sequence[Sides], budget: Budget) -> Answer:
     from fuzzytree.auditing.decide.solver import solver_for
 
     solver = solver_for(base, budget)
@@ -179,11 +179,11 @@ def zeros(
     axis: Axis, literal: Literal, side: int
 ) -> tuple[tuple[Fraction, Fraction], ...]:
     """Return where a literal is 0, by its lower or its upper lines, with some width."""
-    each = [[*_zeros(axis, lines)] for lines in axis.parts[literal][side]]
+    groups = [[*_zeros(axis, lines)] for lines in axis.parts[literal][side]]
     if literal.negated:
-        return tuple(span for spans in each for span in spans)
-    result = each[0]
-    for spans in each[1:]:
+        return tuple(span for spans in groups for span in spans)
+    result = groups[0]
+    for spans in groups[1:]:
         both = itertools.product(result, spans)
         met = ((max(a, c), min(b, d)) for (a, b), (c, d) in both)
         result = [(a, b) for a, b in met if a < b or (a == b and axis.values)]
@@ -290,7 +290,7 @@ def around(base: Base, point: Mapping[str, Fraction], level: Fraction) -> Sides:
         options.append(some)
     result: Sides = {}
     for some in sorted(filter(None, options), key=len):
-        name, literal = next((one for one in some if one[0] in result), some[0])
+        name, literal = next((key for key in some if key[0] in result), some[0])
         axis, x = _alone(base, name, literal), values[name]
         low, high = _extent(axis, axis.bounds[literal].upper, x, level)
         if x in axis.extra:
@@ -304,7 +304,7 @@ def least_cover(claims: Claims, budget: Budget) -> tuple[Fraction, Fraction]:
     """Return bounds of the least strength that the strongest rule has anywhere."""
     base = claims.base
     every = tuple(range(base.count))
-    drawn = base.sampled.max(axis=0).min(initial=1.0) if base.count else 0.0
+    drawn = base.sample_strengths.max(axis=0).min(initial=1.0) if base.count else 0.0
     ends: Sequence[Fraction] = ()
     if base.is_lattice and base.is_exact and not base.is_coupled:
         try:

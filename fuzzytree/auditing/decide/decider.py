@@ -56,7 +56,7 @@ class Decider:
         base = self.base
         if base.is_empty:
             return Proved("the domain has no point")
-        point = self.sampled(question, budget)
+        point = self.sample_answer(question, budget)
         if point is not None:
             return point
         rules = [base.rules[i] for i in question.rules]
@@ -71,10 +71,10 @@ class Decider:
             answer = by_boxes(base, question, budget)
         is_product = not is_lattice and base.is_exact  # curves leave it no more to say
         if isinstance(answer, Open) and (base.is_coupled or is_product):
-            return self._solved(question, budget, answer)
+            return self._solve(question, budget, answer)
         return answer
 
-    def _solved(self, question: Question, budget: Budget, last: Open) -> Answer:
+    def _solve(self, question: Question, budget: Budget, last: Open) -> Answer:
         from fuzzytree.auditing.decide.solver import solver_for, without_solver
 
         solver = solver_for(self.base, budget)
@@ -85,11 +85,11 @@ class Decider:
 
     # --- sampled points
 
-    def sampled(self, question: Question, budget: Budget) -> Point | None:
+    def sample_answer(self, question: Question, budget: Budget) -> Point | None:
         """Return a sampled point that answers a question, if there is one."""
-        if "sampled" not in vars(self.base):
+        if "sample_strengths" not in vars(self.base):
             budget.spend(60 * self.base.size)
-        strengths = self.base.sampled
+        strengths = self.base.sample_strengths
         size = strengths.shape[1]
         budget.spend(len(question.rules) * size // 500 + 10)
         if question.level is not None:

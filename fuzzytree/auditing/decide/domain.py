@@ -99,7 +99,7 @@ class Domain(Value, frozen=True):
 
     def side(self, variable: str) -> DomainSide | None:
         """Return the side of a variable, None if it has none."""
-        return next((one for one in self.sides if one.variable == variable), None)
+        return next((side for side in self.sides if side.variable == variable), None)
 
 
 def whole_side(side: DomainSide) -> DomainSide:
@@ -144,10 +144,10 @@ def linear_form(
     """Return a variable as weights of the inputs, by their numbers, and a constant."""
     if not variable.parts:
         return {number[variable.name]: Fraction(1)}, Fraction(0)
-    return combined(variable.parts, number)
+    return combination(variable.parts, number)
 
 
-def combined(
+def combination(
     parts: Iterable[Part], number: Mapping[str, int]
 ) -> tuple[dict[int, Fraction], Fraction]:
     """Return a combination as weights of the inputs, by their numbers, and a constant.
@@ -173,7 +173,7 @@ def span(variable: Variable, domain: Domain) -> tuple[Fraction, Fraction]:
     if not variable.parts:
         assert side is not None  # checked when the ground was made
         return side.ends
-    number = {one.variable: place for place, one in enumerate(domain.sides)}
+    number = {of.variable: place for place, of in enumerate(domain.sides)}
     weights, low = linear_form(variable, number)
     high = low
     for place, weight in weights.items():
@@ -185,7 +185,7 @@ def span(variable: Variable, domain: Domain) -> tuple[Fraction, Fraction]:
     return low, high
 
 
-def snapped(
+def snap(
     domain: Domain, variables: Iterable[Variable], point: Mapping[str, Fraction]
 ) -> Point:
     """Return the values of rows nearest to a point; itself if they leave the domain."""
@@ -220,7 +220,7 @@ def contains(
 _DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
 
 
-def simplified(
+def simplify(
     point: Mapping[str, Fraction],
     domain: Domain,
     holds: Callable[[Mapping[str, Fraction]], bool],
@@ -232,7 +232,7 @@ def simplified(
     Example:
         >>> from fuzzytree.auditing.decide.domain import Domain, DomainSide
         >>> box = Domain((DomainSide("x", 0.0, 1.0),))
-        >>> simplified({"x": Fraction(1, 3)}, box, lambda at: 3 * at["x"] < 1)
+        >>> simplify({"x": Fraction(1, 3)}, box, lambda at: 3 * at["x"] < 1)
         {'x': Fraction(5944751508129055, 18014398509481984)}
     """
     best = dict(point)

@@ -134,7 +134,7 @@ class LevelView:
         start = strict | weak << count
         options: list[tuple[str, dict[int, Cell]]] = []
         for axis in self.axes:
-            kept = self._kept(axis, question) if loose else 0
+            kept = self._companions(axis, question) if loose else 0
             masks: dict[int, Cell] = {}
             if self.interior is not None:
                 cells = [*self.interior.cells(axis, level, budget, is_at=False)]
@@ -161,7 +161,7 @@ class LevelView:
         pairs = zip(options, way, strict=True)
         return {name: (masks[mask], mask) for (name, masks), mask in pairs}
 
-    def _kept(self, axis: Axis, question: Question) -> int:
+    def _companions(self, axis: Axis, question: Question) -> int:
         """Return the rules that reach a level on an axis because ours do.
 
         Their only literal there is one of ours, whatever its degree is.
@@ -214,14 +214,14 @@ class _Search:
     ) -> None:
         self.base, self.question, self.budget = base, question, budget
         self.interior = interior
-        self.asked: list[int] = []  # rivals and weak ones that joined
+        self.members: list[int] = []  # rivals and weak ones that joined
         if base.is_coupled:
-            self.asked = [*question.rivals, *question.weak]
+            self.members = [*question.rivals, *question.weak]
         self.view = self._view()
         self.count = 0
 
     def _view(self) -> LevelView:
-        rules = (*self.question.reach, *self.asked)
+        rules = (*self.question.reach, *self.members)
         return LevelView(self.base, rules, self.budget, self.interior)
 
     def run(self) -> Answer:
@@ -233,18 +233,18 @@ class _Search:
                 return answer
             if rival is None:
                 break
-            self.asked.append(rival)
+            self.members.append(rival)
             self.view = self._view()
         if is_open:
             return Open("degrees are known within bounds alone", "FTD02")
-        return Proved(f"{self.count} levels", self._needed())
+        return Proved(f"{self.count} levels", self._necessary_rivals())
 
     def _descend(
         self, ceiling: _Ceiling
     ) -> tuple[Answer | None, int | None, _Ceiling, bool]:
         """Try levels below a ceiling; return a rival in the way, and where it was."""
         is_open = False
-        for level, end in self._tried(ceiling):
+        for level, end in self._levels_below(ceiling):
             self.count += 1
             choice = self._choice(level, loose=True)
             if choice is None:
@@ -259,7 +259,7 @@ class _Search:
             is_open = True
         return None, None, ceiling, is_open
 
-    def _tried(self, ceiling: _Ceiling) -> Iterator[tuple[Fraction, _Ceiling]]:
+    def _levels_below(self, ceiling: _Ceiling) -> Iterator[tuple[Fraction, _Ceiling]]:
         """Yield levels that stand for all up to a ceiling, and how far each does."""
         question, (top, is_closed) = self.question, ceiling
         if question.level is not None:
@@ -276,16 +276,16 @@ class _Search:
                 end = min(high, top)
                 yield (low + end) / 2, (end, False)
 
-    def _restricted(self) -> Question:
-        asked, question = set(self.asked), self.question
-        asked.update(question.reach)
+    def _short_question(self) -> Question:
+        rules, question = set(self.members), self.question
+        rules.update(question.reach)
         return question._replace(
-            rivals=tuple(i for i in question.rivals if i in asked),
-            weak=tuple(i for i in question.weak if i in asked),
+            rivals=tuple(i for i in question.rivals if i in rules),
+            weak=tuple(i for i in question.weak if i in rules),
         )
 
     def _choice(self, level: Fraction, *, loose: bool) -> _Choice | None:
-        question = self._restricted()
+        question = self._short_question()
         return self.view.choice(question, level, self.budget, loose=loose)
 
     def _strictly(self, level: Fraction) -> tuple[Point | None, int | None]:
@@ -310,23 +310,23 @@ class _Search:
         top = question.level
         if top is None:
             top = min((low[i] for i in question.reach), default=ONE)
-        rest = set(self.asked)
+        rest = set(self.members)
         against = [i for i in question.rivals if high[i] >= top and i not in rest]
         against += [i for i in question.weak if high[i] > top and i not in rest]
         return None, max(against, key=high.__getitem__, default=None)
 
-    def _needed(self) -> tuple[int, ...]:
+    def _necessary_rivals(self) -> tuple[int, ...]:
         """Return the rivals without which it would not be proved, one by one."""
-        is_large = self.base.is_coupled and len(self.asked) > 8
+        is_large = self.base.is_coupled and len(self.members) > 8
         if is_large or not self.question.reach:  # of a gap nobody reads them
-            return tuple(sorted(self.asked))
-        for rival in [*self.asked] if len(self.asked) > 1 else ():
-            self.asked.remove(rival)
+            return tuple(sorted(self.members))
+        for rival in [*self.members] if len(self.members) > 1 else ():
+            self.members.remove(rival)
             self.view = self._view()
-            levels = self._tried(_TOP)
+            levels = self._levels_below(_TOP)
             if any(self._choice(level, loose=True) for level, _ in levels):
-                self.asked.append(rival)
-        return tuple(sorted(self.asked))
+                self.members.append(rival)
+        return tuple(sorted(self.members))
 
 
 def _bits(places: Iterable[int]) -> int:

@@ -75,10 +75,9 @@ def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | N
             return None
     point = tableau.values[: len(ranges)]
     kept = [
-        _closed(row, slack / 2 * reach)
-        for row, reach in zip(rows, reaches, strict=True)
+        _close(row, slack / 2 * reach) for row, reach in zip(rows, reaches, strict=True)
     ]
-    return _simplified(point, ranges, kept)
+    return _simplify(point, ranges, kept)
 
 
 def least(ranges: Sequence[Range], rows: Sequence[Row], place: int) -> Fraction | None:
@@ -94,7 +93,7 @@ def least(ranges: Sequence[Range], rows: Sequence[Row], place: int) -> Fraction 
     """
     low, high = ranges[place]
     goal = Row({place: ONE}, high=high, is_open_high=True)
-    every = [*(_closed(row, ZERO) for row in rows), goal]
+    every = [*(_close(row, ZERO) for row in rows), goal]
     tableau = _Tableau(ranges, every, [_reach(ranges, row) for row in every])
     if not tableau.repair():
         return None
@@ -119,7 +118,7 @@ def _reach(ranges: Sequence[Range], row: Row) -> Fraction:
     return sum(spans, ZERO) or ONE
 
 
-def _closed(row: Row, slack: Fraction) -> Row:
+def _close(row: Row, slack: Fraction) -> Row:
     """Return a row whose strict sides are drawn in by a slack, and closed."""
     low, high = row.low, row.high
     if row.is_open_low and low is not None:
@@ -129,7 +128,7 @@ def _closed(row: Row, slack: Fraction) -> Row:
     return Row(row.weights, low, high)
 
 
-def _simplified(
+def _simplify(
     point: list[Fraction], ranges: Sequence[Range], rows: Sequence[Row]
 ) -> list[Fraction]:
     """Return a point of few digits that satisfies the rows as well, one by one."""
@@ -195,7 +194,7 @@ class _Tableau:
         """Bring every sum within its bounds; return whether that is possible."""
         while True:
             checkpoint()
-            broken = next((one for one in sorted(self.sums) if self._gap(one)), None)
+            broken = next((n for n in sorted(self.sums) if self._gap(n)), None)
             if broken is None:
                 return True
             gap = self._gap(broken)

@@ -24,7 +24,7 @@ from fuzzytree.auditing.decide.answers import (
     Proved,
 )
 from fuzzytree.auditing.decide.base import Base
-from fuzzytree.auditing.decide.contest import STEPS, Contest, decided
+from fuzzytree.auditing.decide.contest import STEPS, Contest, decision
 from fuzzytree.auditing.decide.costs import LEAST, NARROW, Costs, Nearest
 from fuzzytree.auditing.decide.linear import simple
 from fuzzytree.auditing.decide.polytopes import Leaves
@@ -69,18 +69,20 @@ def nearest(
         >>> leaves = Leaves(tree, box)
         >>> row = dict.fromkeys(tree.inputs, ZERO)
         >>> change = nearest(leaves, row)
-        >>> change.is_narrow, leaves.decided(change.point) != leaves.decided(row)
+        >>> change.is_narrow, leaves.decision(change.point) != leaves.decision(row)
         (True, True)
     """
     budget = budget or Budget()
     of = Costs(base.domain, tuple(base.inputs), fixed, costs)
     own = (
-        base.decided(point)[0] if isinstance(base, Leaves) else decided(base, point)[0]
+        base.decision(point)[0]
+        if isinstance(base, Leaves)
+        else decision(base, point)[0]
     )
     if own == wanted is not None:
         return Nearest(ZERO, ZERO, dict(point))
     if isinstance(base, Leaves):
-        return base.parts.nearest(point, base.chosen(own, wanted), of, budget)
+        return base.parts.nearest(point, base.goals(own, wanted), of, budget)
     return _Search(Contest(base, own, wanted), point, of, budget).run()
 
 

@@ -22,7 +22,7 @@ from fuzzytree.auditing.decide.bounds import (
     average,
     exact,
     largest,
-    stacked,
+    stack,
 )
 from fuzzytree.auditing.decide.boxes import Boxes
 from fuzzytree.auditing.decide.rules import rules_of
@@ -57,7 +57,7 @@ class _Group(NamedTuple):
     is_product: bool
     degrees: FloatArray  # of the term at the samples
 
-    def implied(self, strength: FloatArray) -> FloatArray:
+    def conclude(self, strength: FloatArray) -> FloatArray:
         """Return the degrees of the samples that the rules conclude."""
         if self.is_product:
             return strength * self.degrees
@@ -196,14 +196,14 @@ class OutputBounds:
         """Return bounds of what is averaged, and of its weights."""
         if self.is_weighted:
             values = [self._value(boxes, group.term) for group in self.groups]
-            return stacked(values), stacked(strengths)
+            return stack(values), stack(strengths)
         join = _JOINS[self.output.aggregation or "maximum"]
         low, high = (reduce(join, self._heights(strengths, side)) for side in (0, 1))
         return exact(self.samples), Bounds(low * self.shares, high * self.shares)
 
     def _heights(self, strengths: Sequence[Bounds], side: int) -> list[FloatArray]:
         pairs = zip(self.groups, strengths, strict=True)
-        return [group.implied(strength[side]) for group, strength in pairs]
+        return [group.conclude(strength[side]) for group, strength in pairs]
 
     def _value(self, boxes: Boxes, term: Term) -> Bounds:
         """Return bounds of the number of a term on each box."""
@@ -246,7 +246,7 @@ class OutputBounds:
             )
             far = values.plus(y)
         moves = zip(self._moves(strengths, far), changes, strict=True)
-        result = stacked([move.times(change.slope) for move, change in moves]).total()
+        result = stack([move.times(change.slope) for move, change in moves]).total()
         result = result if self.is_sum else result.over(weights.total())
         place = self.system.inputs.index(name)
         functions = [group.term.function for group in self.groups]

@@ -113,7 +113,9 @@ class Pairs:
     @cached_property
     def sets(self) -> dict[str, list[_Set]]:
         """The literals of each rule on each axis."""
-        result = {axis.name: [_EMPTY] * self.base.count for axis in self.base.used}
+        result = {
+            axis.name: [_EMPTY] * self.base.count for axis in self.base.axes_in_use
+        }
         for place, rule in enumerate(self.base.rules):
             for name, literal in rule.literals:
                 count = 1
@@ -223,7 +225,7 @@ class Pairs:
         answer = self.claims.ask(Question((i, j), level=level), budget)
         if not isinstance(answer, Point):
             return Common(reached, most, None, answer)
-        drawn = np.minimum(base.sampled[i], base.sampled[j])
+        drawn = np.minimum(base.sample_strengths[i], base.sample_strengths[j])
         tried = [answer.values, base.sample(int(drawn.argmax()))]
         tried += [point] if point is not None else []
         points = [dict(one) for one in tried if base.contains(one)]
@@ -299,10 +301,10 @@ class Pairs:
     def _has_twins(self) -> bool:
         """Whether two axes are one sum of inputs but for a factor."""
         seen = set()
-        for axis in self.base.used:
+        for axis in self.base.axes_in_use:
             first = next(iter(axis.weights.values()), ONE)
             seen.add(frozenset((of, w / first) for of, w in axis.weights.items()))
-        return len(seen) < len(self.base.used)
+        return len(seen) < len(self.base.axes_in_use)
 
     def tie(self, i: int, j: int, budget: Budget) -> Answer:
         """Return whether two rules are as strong, and the strongest, on some width."""
@@ -318,7 +320,9 @@ class Pairs:
         rest = tuple(k for k in range(base.count) if k not in pair)
         is_lattice = all(rule.norm == "minimum" for rule in rules)
         pieces = {
-            axis: found for axis in base.used if (found := self._shared(axis, *pair))
+            axis: found
+            for axis in base.axes_in_use
+            if (found := self._shared(axis, *pair))
         }
         levels = self._plateaus(i) & self._plateaus(j) if is_lattice else set()
         levels = {t for t in levels if float(t) <= most + 1e-12}
@@ -364,7 +368,7 @@ class Pairs:
     @cached_property
     def _flat(self) -> dict[tuple[str, Literal], set[Fraction]]:
         result: dict[tuple[str, Literal], set[Fraction]] = {}
-        for axis in self.base.used:
+        for axis in self.base.axes_in_use:
             for literal, sides in axis.parts.items():
                 values = [
                     {v for lines in side for v in _levels(axis, lines)}
@@ -383,7 +387,7 @@ class Pairs:
                 for a, b, p, q in lines.pieces()
                 if p != q
             }
-            for axis in self.base.used
+            for axis in self.base.axes_in_use
             for literal, sides in axis.parts.items()
         }
 
@@ -433,7 +437,7 @@ class Pairs:
         ):
             return True
         ratios = {base.rules[i].factor / base.rules[j].factor}
-        for axis in base.used:
+        for axis in base.axes_in_use:
             mine, theirs = (self.sets[axis.name][k] for k in (i, j))
             if not (mine or theirs):
                 continue
@@ -456,7 +460,7 @@ class Pairs:
         self, i: int, j: int, rest: tuple[int, ...], budget: Budget
     ) -> Answer | None:
         """Return a drawn point at which two rules tie, as they do all around it."""
-        base, drawn = self.base, self.base.sampled
+        base, drawn = self.base, self.base.sample_strengths
         top = drawn[[*rest]].max(axis=0) if rest else np.zeros(drawn.shape[1])
         is_tie = (np.abs(drawn[i] - drawn[j]) < 1e-12) & (drawn[i] > top - 1e-12)
         is_tie &= drawn[i] > 0.0

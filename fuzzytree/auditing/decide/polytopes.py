@@ -172,7 +172,7 @@ class Polytopes:
                     why = "sums of whole numbers have too many parts"
                     raise OutOfStepsError
                 enough = None if best is None else best.high
-                reached = self._reached(part, centre, costs, enough, budget)
+                reached = self._least_cost(part, centre, costs, enough, budget)
             except OutOfStepsError:
                 low = min(Fraction(bound), ONE if low is None else low)
                 why = why or "the budget was spent"
@@ -195,7 +195,7 @@ class Polytopes:
             return Nearest(ONE if low is None else low, why=why, is_none=low is None)
         return Nearest(min(low or ZERO, best.high), best.high, best.point, why)
 
-    def _reached(
+    def _least_cost(
         self,
         part: Polytope,
         centre: Mapping[str, Fraction],
@@ -386,12 +386,12 @@ class Leaves:
         of = [polytope_of(box, tree.inputs, tree.variables) for box in self.boxes]
         self.parts = Polytopes(tree.inputs, of)
 
-    def decided(self, point: Mapping[str, Fraction]) -> tuple[str, int]:
+    def decision(self, point: Mapping[str, Fraction]) -> tuple[str, int]:
         """Return the class of the leaf that a point reaches, and the leaf's number."""
         leaf = leaf_at(self.tree, point)
         return self.tree.leaves[leaf - 1].label, leaf
 
-    def chosen(self, label: str | None, wanted: str | None) -> list[int]:
+    def goals(self, label: str | None, wanted: str | None) -> list[int]:
         """Return the parts of a wanted class, or of any other than a label."""
         if wanted is not None:
             return [n for n, own in enumerate(self.labels) if own == wanted]

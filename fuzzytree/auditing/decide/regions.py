@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from fuzzytree.auditing.decide.domain import (
     Domain,
     DomainSide,
-    snapped,
+    snap,
     span,
     variable_value,
 )
@@ -189,7 +189,7 @@ def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:
     if result is None:
         return None
     point = dict(zip(tree.inputs, result, strict=True))
-    return snapped(box, tree.variables, point)
+    return snap(box, tree.variables, point)
 
 
 def leaf_at(tree: FuzzyTree, point: Mapping[str, Fraction]) -> int:

@@ -238,7 +238,7 @@ class Agreement:
             For each rule the others as bits.
         """
         bits = [self.base.every] * self.base.count
-        for axis in self.base.used if self.is_made_of_lines else ():
+        for axis in self.base.axes_in_use if self.is_made_of_lines else ():
             cells = [cell.masks for cell in axis.cells_at(level, budget)]
             masks = {cell.perhaps if level else cell.perhaps_above for cell in cells}
             for place in range(self.base.count):

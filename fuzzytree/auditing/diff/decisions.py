@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.auditing.decide import Budget
-from fuzzytree.auditing.decide.domain import simplified
+from fuzzytree.auditing.decide.domain import simplify
 from fuzzytree.auditing.decide.states import (
     Bracket,
     Proved,
@@ -140,7 +140,7 @@ def _simple(
     def holds(tried: Mapping[str, Fraction]) -> bool:
         return both.labels(tried) == labels
 
-    return simplified(point, both.base.domain, holds)
+    return simplify(point, both.base.domain, holds)
 
 
 def _prediction_text(prediction: Prediction) -> str:

@@ -21,7 +21,7 @@ import numpy as np
 
 from fuzzytree.auditing.decide import Budget, OutOfStepsError
 from fuzzytree.auditing.decide.answers import ZERO
-from fuzzytree.auditing.decide.domain import Domain, simplified
+from fuzzytree.auditing.decide.domain import Domain, simplify
 from fuzzytree.auditing.decide.states import (
     Bracket,
     Declined,
@@ -274,7 +274,7 @@ class _Numbers(Differences):
             return numbers(point)[0] >= largest * _MOST_SHOWN
 
         row = {key: Fraction(value) for key, value in start.items()}
-        point = simplified(row, self.pair.domain, is_large)
+        point = simplify(row, self.pair.domain, is_large)
         gap, was, now = numbers(point)
         facts = {"now": _text(now), "was": _text(was), "how": _HOW}
         measure = Measure("largest difference", gap)

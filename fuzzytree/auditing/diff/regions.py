@@ -30,7 +30,7 @@ def difference_region(
     Returns:
         Nothing where a rule uses a combination, or the point is not on the domain.
     """
-    used = both.base.used
+    used = both.base.axes_in_use
     if not (all(axis.is_input for axis in used) and both.base.contains(point)):
         return ()
     region = _Region(both, point)

@@ -157,7 +157,7 @@ def _rules_that_matter(subject: Subject) -> Iterator[AuditAnswer]:
     for place in range(base.count if base.count > 1 else 0):
         text = f"is {subject.rule_name(place + 1)} needed"
         subject.budget.report(text, 0.5 + 0.3 * place / base.count)
-        answer = subject.claims.needed(place, subject.budget)
+        answer = subject.claims.matters(place, subject.budget)
         if isinstance(answer, Point):
             before = base.rules[place].then
             facts = {"before": before, "then": subject.class_at(answer.values, place)}

@@ -11,8 +11,8 @@ import numpy as np
 from fuzzytree.auditing.decide.answers import Budget, OutOfStepsError, Point
 from fuzzytree.auditing.decide.answers import Proved as NoPoint
 from fuzzytree.auditing.decide.base import Base
-from fuzzytree.auditing.decide.contest import Contest, decided
-from fuzzytree.auditing.decide.domain import Domain, DomainSide, contains, simplified
+from fuzzytree.auditing.decide.contest import Contest, decision
+from fuzzytree.auditing.decide.domain import Domain, DomainSide, contains, simplify
 from fuzzytree.auditing.decide.polytopes import Leaves
 from fuzzytree.auditing.decide.regions import (
     Interval,
@@ -201,8 +201,8 @@ class TreeAndRules:
 
     def differ(self, point: Mapping[str, Fraction]) -> bool:
         """Return whether both decide differently at a point of the domain."""
-        label, _ = self.leaves.decided(point)
-        return label != decided(self.base, point)[0] and contains(
+        label, _ = self.leaves.decision(point)
+        return label != decision(self.base, point)[0] and contains(
             self.domain, self.tree.variables, point
         )
 
@@ -236,17 +236,17 @@ class TreeAndRules:
                 why = why or answer.why
         if point is None:
             return Declined("FTD03", why) if why else Proved("")
-        label = decided(self.base, point)[0]
-        near = simplified(
+        label = decision(self.base, point)[0]
+        near = simplify(
             point,
             self.domain,
             lambda other: (
                 self.differ(other)
-                and self.leaves.decided(other)[1] == leaf
-                and decided(self.base, other)[0] == label
+                and self.leaves.decision(other)[1] == leaf
+                and decision(self.base, other)[0] == label
             ),
         )
-        own = Claim("decides", of="tree", label=self.leaves.decided(near)[0])
+        own = Claim("decides", of="tree", label=self.leaves.decision(near)[0])
         other = Claim("decides", of="raw rules", label=label)
         return Witness(coordinates(near), (own, other))
 
@@ -273,7 +273,7 @@ def raw_answers(subject: Subject) -> Iterator[AuditAnswer]:
             alike += 1
         elif isinstance(state, Witness):
             point = {at.input: Fraction(at.exact) for at in state.point}
-            other, place = decided(both.base, point)
+            other, place = decision(both.base, point)
             if place is not None and place + 1 != leaf:
                 rules.append(place + 1)
             facts = {"then": tree.leaves[leaf - 1].label, "other": other}

@@ -78,7 +78,7 @@ def _dominance(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer which rules another one hides, of their class (FT104) or not (FT105)."""
     claims, budget, rules = subject.claims, subject.budget, subject.base.rules
     budget.report("subsumed rule", 0.0)
-    above = claims.drawn_above(budget)
+    above = claims.above_at_samples(budget)
     fires = [
         bool(above[place].any()) or not isinstance(claims.fires(place, budget), NoPoint)
         for place in range(subject.base.count)

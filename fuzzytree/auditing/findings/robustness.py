@@ -11,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fuzzytree.auditing.decide.base import Base
-from fuzzytree.auditing.decide.contest import decided
+from fuzzytree.auditing.decide.contest import decision
 from fuzzytree.auditing.decide.costs import Costs, Nearest
 from fuzzytree.auditing.decide.cover import Sides
 from fuzzytree.auditing.decide.domain import (
     Domain,
     DomainSide,
     contains,
-    simplified,
+    simplify,
     variable_value,
 )
 from fuzzytree.auditing.decide.domain import span as ends_on
@@ -64,9 +64,9 @@ class RowDecider:
     def decision(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
         """Return the class at a point, and the leaf or the rule that decides."""
         if isinstance(self.base, Leaves):
-            label, leaf = self.base.decided(point)
+            label, leaf = self.base.decision(point)
             return label, f"leaf {leaf}"
-        own, place = decided(self.base, point)
+        own, place = decision(self.base, point)
         return own, "no rule" if place is None else self.subject.rule_name(place + 1)
 
 
@@ -125,7 +125,7 @@ def _radius(
         return audit_answer("FT204.none-known", title, bracket, facts=facts)
     other, _ = decider.decision(result.point)
     moved = [axis for axis, value in result.point.items() if value != point[axis]]
-    near = simplified(
+    near = simplify(
         {axis: result.point[axis] for axis in moved},
         decider.domain,
         lambda some: decider.decision({**point, **some})[0] == other,

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide import Base, Budget
-from fuzzytree.auditing.decide.contest import decided
+from fuzzytree.auditing.decide.contest import decision
 from fuzzytree.auditing.decide.costs import Costs, Nearest
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.nearest import nearest
@@ -64,9 +64,9 @@ def check(
 
     def label(point: dict[str, Fraction]) -> str | None:
         return (
-            source.decided(point)[0]
+            source.decision(point)[0]
             if isinstance(source, Leaves)
-            else decided(source, point)[0]
+            else decision(source, point)[0]
         )
 
     def is_sought(point: dict[str, Fraction]) -> bool:
