@@ -27,7 +27,7 @@ from fuzzytree.auditing.decide.lines import (
     Lines,
     degree_within,
     lines_of,
-    refined,
+    refine,
     value_at,
 )
 from fuzzytree.auditing.decide.rules import Literal
@@ -167,7 +167,7 @@ class Axis:
                 both = function_lines(function, self.least, self.largest)
                 both = _coarser(both, self.most_pieces)
                 if literal.negated:
-                    both = both.negated()
+                    both = both.complement()
                 low = _literal_lines(both.lower, literal)
                 lower.append(low)
                 upper.append(
@@ -253,12 +253,12 @@ class Axis:
             xs = [*self.values]
             lines = {id(line): _at_values(line, xs) for line in self._distinct}
         else:
-            lines = {id(line): refined(line, xs) for line in self._distinct}
+            lines = {id(line): refine(line, xs) for line in self._distinct}
             if self.is_crossed:
                 more = [*_crossings([*lines.values()])]
                 if more:
                     xs = _in_order([*xs, *more])
-                    lines = {name: refined(line, xs) for name, line in lines.items()}
+                    lines = {name: refine(line, xs) for name, line in lines.items()}
         result: dict[Literal, Between] = {}
         for literal, (lower, upper) in self.parts.items():
             pick = min if literal.negated else max
@@ -522,7 +522,7 @@ def _literal_lines(lines: Lines, literal: Literal) -> Lines:
     lines = _times(lines, literal.scale)
     if not literal.lowered:
         return lines
-    return lines.lowered(literal.lowered)
+    return lines.minus(literal.lowered)
 
 
 def _at_values(lines: Lines, xs: Sequence[Fraction]) -> Lines:

@@ -101,11 +101,11 @@ class Lines(NamedTuple):
             if low < high:
                 yield x, low, high
 
-    def lowered(self, by: Fraction) -> Lines:
+    def minus(self, by: Fraction) -> Lines:
         """Return the same, lower by a number."""
         return self._each(lambda value: value - by)
 
-    def negated(self) -> Lines:
+    def complement(self) -> Lines:
         """Return 1 minus it."""
         return self._each(lambda value: 1 - value)
 
@@ -125,10 +125,10 @@ class Between(NamedTuple):
         """Whether it is known exactly."""
         return self.lower is self.upper
 
-    def negated(self) -> Between:
+    def complement(self) -> Between:
         """Return 1 minus it."""
-        upper = self.lower.negated()
-        return Between(upper if self.is_exact else self.upper.negated(), upper)
+        upper = self.lower.complement()
+        return Between(upper if self.is_exact else self.upper.complement(), upper)
 
 
 def _on(a: Fraction, b: Fraction, p: Fraction, q: Fraction, x: Fraction) -> Fraction:
@@ -178,7 +178,7 @@ def lines_of(function: MembershipFunction, low: Fraction, high: Fraction) -> Bet
             inner.append(zero + CAP * (Fraction(edge) - zero))
     knots = sorted({low, high, *(k for k in inner if low < k < high)})
     if not isinstance(function, Band | Points):
-        return _enclosed(function, knots)
+        return _enclose(function, knots)
     at = tuple(exact_degree(function, x) for x in knots)
     ends = [_straight(function, a, b) for a, b in itertools.pairwise(knots)]
     lines = Lines(
@@ -205,13 +205,13 @@ class _Chord(NamedTuple):
     q: Fraction
 
 
-def _enclosed(function: MembershipFunction, knots: Sequence[Fraction]) -> Between:
+def _enclose(function: MembershipFunction, knots: Sequence[Fraction]) -> Between:
     if len(knots) == 1:
         low, high = degree_within(function, knots[0])
         x = knots[0]
         return Between(constant(low, x, x), constant(high, x, x))
     blocks = [
-        one for a, b in itertools.pairwise(knots) for one in _blocks(function, a, b)
+        block for a, b in itertools.pairwise(knots) for block in _blocks(function, a, b)
     ]
     degrees = {x: degree_within(function, x) for x in knots}
     # Elsewhere it is continuous.
@@ -226,16 +226,16 @@ def _enclosed(function: MembershipFunction, knots: Sequence[Fraction]) -> Betwee
             for side, chord in zip(sides, _chords(block, (a, b), ends), strict=True):
                 side.append(chord)
     least = min((block.range[0] for block in blocks), default=ZERO)
-    held = min(least, *(low for low, _ in degrees.values())), ONE
+    caps = min(least, *(low for low, _ in degrees.values())), ONE
     lower, upper = (
         _line(
-            [*_held(chords, limit, max if side == 0 else min)],
+            [*_limit_chords(chords, limit, max if side == 0 else min)],
             {x: bounds[side] for x, bounds in degrees.items()},
         )
-        for side, (chords, limit) in enumerate(zip(sides, held, strict=True))
+        for side, (chords, limit) in enumerate(zip(sides, caps, strict=True))
     )
     knots = sorted({*lower.x, *upper.x})
-    return Between(refined(lower, knots), refined(upper, knots))
+    return Between(refine(lower, knots), refine(upper, knots))
 
 
 class _Block(NamedTuple):
@@ -255,8 +255,8 @@ class _Block(NamedTuple):
         low, high = self.bend
         share = length**2 / 8
         return (
-            _rounded(max(high, ZERO) * share)[1],
-            _rounded(max(-low, ZERO) * share)[1],
+            _on_grid(max(high, ZERO) * share)[1],
+            _on_grid(max(-low, ZERO) * share)[1],
         )
 
     @property
@@ -285,12 +285,12 @@ def _blocks(function: MembershipFunction, a: Fraction, b: Fraction) -> Iterator[
 
 
 def _block(function: MembershipFunction, a: Fraction, b: Fraction) -> _Block:
-    known = jet(function, outwards(a)[0], outwards(b)[1])
-    range_ = _within(known.value.low, known.value.high)
-    if range_[0] == range_[1] or not math.isfinite(known.bend.size):
+    bounds = jet(function, outwards(a)[0], outwards(b)[1])
+    range_ = _within(bounds.value.low, bounds.value.high)
+    if range_[0] == range_[1] or not math.isfinite(bounds.bend.size):
         return _Block(((a, b),), None, range_)
-    bend = Fraction(known.bend.low), Fraction(known.bend.high)
-    off = max(known.bend.high, 0.0) + max(-known.bend.low, 0.0)
+    bend = Fraction(bounds.bend.low), Fraction(bounds.bend.high)
+    off = max(bounds.bend.high, 0.0) + max(-bounds.bend.low, 0.0)
     needed = (float(b) - float(a)) * math.sqrt(off / (8 * float(APART))) * _MORE
     count = math.ceil(min(max(needed, 1.0), _PARTS))
     inner = (Fraction(float(a + (b - a) * k / count)) for k in range(1, count))
@@ -315,7 +315,7 @@ def _chords(
     return _Chord(*part, p - below, q - below), _Chord(*part, r + above, s + above)
 
 
-def _held(
+def _limit_chords(
     chords: Sequence[_Chord],
     limit: Fraction,
     pick: Callable[[Fraction, Fraction], Fraction],
@@ -336,13 +336,13 @@ def _held(
 
 
 def _line(chords: Sequence[_Chord], degrees: Mapping[Fraction, Fraction]) -> Lines:
-    x = (*(one.a for one in chords), chords[-1].b)
-    at = (degrees.get(one.a, one.p) for one in chords)
+    x = (*(chord.a for chord in chords), chords[-1].b)
+    at = (degrees.get(chord.a, chord.p) for chord in chords)
     return Lines(
         x,
         (*at, degrees[x[-1]]),
-        tuple(one.p for one in chords),
-        tuple(one.q for one in chords),
+        tuple(chord.p for chord in chords),
+        tuple(chord.q for chord in chords),
     )
 
 
@@ -355,7 +355,7 @@ def value_at(lines: Lines, x: Fraction) -> Fraction:
     return lines.value(x)
 
 
-def refined(lines: Lines, xs: Sequence[Fraction]) -> Lines:
+def refine(lines: Lines, xs: Sequence[Fraction]) -> Lines:
     """Return lines on more knots."""
     if len(xs) == len(lines.x) and lines.x == tuple(xs):
         return lines
@@ -396,11 +396,11 @@ def _limit(
     but from 0 to 1.
     """
     if isinstance(function, Hedged):
-        return _changed(function, _limit(function.function, x, to))
+        return _apply_hedges(function, _limit(function.function, x, to))
     if isinstance(function, Band | Points) and to > 0:
-        return _rounded(lines_of(function, x, x + 1).lower.after[0])
+        return _on_grid(lines_of(function, x, x + 1).lower.after[0])
     if isinstance(function, LR | Band | Points):
-        return _rounded(exact_degree(function, x))
+        return _on_grid(exact_degree(function, x))
     at = degree_within(function, x)
     if x != Fraction(float(x)):
         return at
@@ -411,7 +411,7 @@ def _limit(
     return _within(near.low, near.high)
 
 
-def _rounded(value: Fraction) -> tuple[Fraction, Fraction]:
+def _on_grid(value: Fraction) -> tuple[Fraction, Fraction]:
     """Return two numbers of few digits around one: later steps are faster with them."""
     low = Fraction(math.floor(value * _GRID), _GRID)
     return low, low if low == value else low + Fraction(1, _GRID)
@@ -422,23 +422,23 @@ def degree_within(
 ) -> tuple[Fraction, Fraction]:
     """Return between which fractions of few digits a degree lies."""
     if isinstance(function, LR):
-        return _rounded(exact_degree(function, x))
+        return _on_grid(exact_degree(function, x))
     if isinstance(function, Hedged):
-        return _changed(function, degree_within(function.function, x))
-    known = None
+        return _apply_hedges(function, degree_within(function.function, x))
+    bounds = None
     if (
         isinstance(function, Curve) and float(x) in function.knots()
     ):  # where it may be 0 or 1 exactly
-        known = degree_between(function, x)
-    low, high = known or degree_bounds(function, x)
+        bounds = degree_between(function, x)
+    low, high = bounds or degree_bounds(function, x)
     return _within(low, high)
 
 
-def _changed(
-    function: Hedged, known: tuple[Fraction, Fraction]
+def _apply_hedges(
+    function: Hedged, bounds: tuple[Fraction, Fraction]
 ) -> tuple[Fraction, Fraction]:
     """Return what becomes of bounds of a degree."""
-    near = Jet(Interval(outwards(known[0])[0], outwards(known[1])[1]))
+    near = Jet(Interval(outwards(bounds[0])[0], outwards(bounds[1])[1]))
     algebra = Enclosed(is_open=False)
     return _within(*hedged(algebra, function.hedges, function.height * near).value)
 
@@ -446,37 +446,37 @@ def _changed(
 def _within(low: float | Fraction, high: float | Fraction) -> tuple[Fraction, Fraction]:
     """Return bounds of a degree as fractions of few digits, from 0 to 1."""
     ends = Fraction(min(max(low, 0), 1)), Fraction(max(min(high, 1), 0))
-    return _rounded(ends[0])[0], _rounded(ends[1])[1]
+    return _on_grid(ends[0])[0], _on_grid(ends[1])[1]
 
 
-def combined(
+def combine(
     every: Sequence[Lines], pick: Callable[[tuple[Fraction, Fraction]], Fraction]
 ) -> Lines:
     """Return the least (`min`), largest (`max`) or sum of functions of one range.
 
     Example:
         >>> rise = lines_of(Points((0.0, 1.0), (0.0, 1.0)), Fraction(0), Fraction(1))
-        >>> combined([rise.lower, rise.lower.negated()], min).highest
+        >>> combine([rise.lower, rise.lower.complement()], min).highest
         Fraction(1, 2)
     """
     if len(every) == 1:
         return every[0]
     result = every[0]
     for other in every[1:]:
-        result = _joined(result, other, pick)
+        result = _combine_two(result, other, pick)
     return result
 
 
-def _joined(
-    one: Lines, other: Lines, pick: Callable[[tuple[Fraction, Fraction]], Fraction]
+def _combine_two(
+    first: Lines, second: Lines, pick: Callable[[tuple[Fraction, Fraction]], Fraction]
 ) -> Lines:
     checkpoint()
     x: list[Fraction] = []
     at: list[Fraction] = []
     after: list[Fraction] = []
     before: list[Fraction] = []
-    values = at_knots(one, other)
-    for a, b, p, q, r, s in together(one, other):
+    values = at_knots(first, second)
+    for a, b, p, q, r, s in together(first, second):
         x.append(a)
         at.append(pick(next(values)[1:]))
         if (p - r) * (q - s) < 0:
@@ -490,44 +490,46 @@ def _joined(
         else:
             after.append(pick((p, r)))
             before.append(pick((q, s)))
-    x.append(one.x[-1])
-    at.append(pick((one.at[-1], other.at[-1])))
+    x.append(first.x[-1])
+    at.append(pick((first.at[-1], second.at[-1])))
     return Lines(tuple(x), tuple(at), tuple(after), tuple(before))
 
 
 def together(
-    one: Lines, other: Lines
+    first: Lines, second: Lines
 ) -> Iterator[tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]]:
     """Yield where both are straight: the ends, and both values at both ends."""
     i = j = 0
-    a = one.x[0]
-    p, r = (of.after[0] if of.after else ZERO for of in (one, other))
-    while i < len(one.after) and j < len(other.after):
-        end, rival_end = one.x[i + 1], other.x[j + 1]
+    a = first.x[0]
+    p, r = (of.after[0] if of.after else ZERO for of in (first, second))
+    while i < len(first.after) and j < len(second.after):
+        end, rival_end = first.x[i + 1], second.x[j + 1]
         is_first, is_last = end <= rival_end, end >= rival_end
         b = end if is_first else rival_end
-        q, s = one.before[i], other.before[j]
+        q, s = first.before[i], second.before[j]
         if not is_first:
-            q = _on(one.x[i], end, one.after[i], q, b)
+            q = _on(first.x[i], end, first.after[i], q, b)
         if not is_last:
-            s = _on(other.x[j], rival_end, other.after[j], s, b)
+            s = _on(second.x[j], rival_end, second.after[j], s, b)
         yield a, b, p, q, r, s
         p, r = q, s
         if is_first:
             i += 1
-            p = one.after[i] if i < len(one.after) else ZERO
+            p = first.after[i] if i < len(first.after) else ZERO
         if is_last:
             j += 1
-            r = other.after[j] if j < len(other.after) else ZERO
+            r = second.after[j] if j < len(second.after) else ZERO
         a = b
 
 
-def at_knots(one: Lines, other: Lines) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
+def at_knots(
+    first: Lines, second: Lines
+) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
     """Yield all knots of two functions, with both values there."""
     mine, theirs = (
-        dict(zip(one.x, one.at, strict=True)),
-        dict(zip(other.x, other.at, strict=True)),
+        dict(zip(first.x, first.at, strict=True)),
+        dict(zip(second.x, second.at, strict=True)),
     )
-    for a, _, p, _, r, _ in together(one, other):
+    for a, _, p, _, r, _ in together(first, second):
         yield a, mine.get(a, p), theirs.get(a, r)
-    yield one.x[-1], one.at[-1], other.at[-1]
+    yield first.x[-1], first.at[-1], second.at[-1]

@@ -18,7 +18,7 @@ from fuzzytree.auditing.decide.lines import (
     Between,
     Lines,
     at_knots,
-    combined,
+    combine,
     lines_of,
     together,
 )
@@ -106,7 +106,7 @@ class Overlap(NamedTuple):
     is_around: bool  # whether the first is nowhere below the second
 
 
-def overlap(one: Between, other: Between) -> Overlap | None:
+def overlap(first: Between, second: Between) -> Overlap | None:
     """Return how much two functions share, None if they have no area.
 
     Example:
@@ -116,28 +116,28 @@ def overlap(one: Between, other: Between) -> Overlap | None:
         >>> result.jaccard.low, result.possibility.low
         (Fraction(1, 3), Fraction(1, 2))
     """
-    lower = upper = combined([one.lower, other.lower], min)
-    if not (one.is_exact and other.is_exact):
-        upper = combined([one.upper, other.upper], min)
+    lower = upper = combine([first.lower, second.lower], min)
+    if not (first.is_exact and second.is_exact):
+        upper = combine([first.upper, second.upper], min)
     shared = area(Between(lower, upper))
-    sums = map(sum, zip(area(one), area(other), strict=True))
+    sums = map(sum, zip(area(first), area(second), strict=True))
     least, most = (both - part for both, part in zip(sums, shared, strict=True))
     if least <= 0:
         return None
     return Overlap(
         Bounds(shared.low / most, min(shared.high / least, ONE)),
         height(Between(lower, upper))[0],
-        _crossing(one.lower, other.lower),
-        one == other or all(gap <= 0 for gap, _ in _gaps(one.upper, other.lower)),
-        one == other or all(gap <= 0 for gap, _ in _gaps(other.upper, one.lower)),
+        _order_change(first.lower, second.lower),
+        first == second or all(gap <= 0 for gap, _ in _gaps(first.upper, second.lower)),
+        first == second or all(gap <= 0 for gap, _ in _gaps(second.upper, first.lower)),
     )
 
 
-def _crossing(one: Lines, other: Lines) -> tuple[Fraction, Fraction] | None:
+def _order_change(first: Lines, second: Lines) -> tuple[Fraction, Fraction] | None:
     """Return the highest place where two functions change their order."""
     places: list[tuple[Fraction, Fraction]] = []
     order, last = ZERO, (ZERO, ZERO)
-    for a, b, p, q, r, s in together(one, other):
+    for a, b, p, q, r, s in together(first, second):
         events = [(p - r, p, a), (q - s, q, b)]
         if (p - r) * (q - s) < 0:
             share = (p - r) / (p - r - q + s)
@@ -149,7 +149,7 @@ def _crossing(one: Lines, other: Lines) -> tuple[Fraction, Fraction] | None:
     return max(places, key=itemgetter(0), default=None)
 
 
-def most_shared(curves: Sequence[Between]) -> FloatArray:
+def most_overlap(curves: Sequence[Between]) -> FloatArray:
     """Return bounds from above of the shared by the joined area of each two functions.
 
     On a cell two share no more than the smaller of their areas, and join no less than
@@ -190,7 +190,7 @@ class CurveDistance(NamedTuple):
 
 
 def curve_distance(
-    one: MembershipFunction, other: MembershipFunction, low: Fraction, high: Fraction
+    first: MembershipFunction, second: MembershipFunction, low: Fraction, high: Fraction
 ) -> CurveDistance:
     """Return how far two membership functions are apart at most between two ends.
 
@@ -200,16 +200,16 @@ def curve_distance(
         >>> [str(x) for x in curve_distance(steep, slow, Fraction(0), Fraction(4))]
         ['1/2', '1/2', '1']
     """
-    mine, rival = (lines_of(of, low, high) for of in (one, other))
+    mine, rival = (lines_of(of, low, high) for of in (first, second))
     least = (*_gaps(mine.lower, rival.upper), *_gaps(rival.lower, mine.upper))
     most = (*_gaps(mine.upper, rival.lower), *_gaps(rival.upper, mine.lower))
     largest, at = max(most, key=itemgetter(0))
     return CurveDistance(max(ZERO, *(gap for gap, _ in least)), largest, at)
 
 
-def _gaps(one: Lines, other: Lines) -> Iterator[tuple[Fraction, Fraction]]:
+def _gaps(first: Lines, second: Lines) -> Iterator[tuple[Fraction, Fraction]]:
     """Yield by how much a function is above another one, where that can be most."""
-    yield from ((value - rival, x) for x, value, rival in at_knots(one, other))
-    for a, b, p, q, r, s in together(one, other):
+    yield from ((value - rival, x) for x, value, rival in at_knots(first, second))
+    for a, b, p, q, r, s in together(first, second):
         yield p - r, a
         yield q - s, b

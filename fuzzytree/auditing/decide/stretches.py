@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.decide.lines import Lines, refined, value_at
+from fuzzytree.auditing.decide.lines import Lines, refine, value_at
 from fuzzytree.model import BoolArray, FloatArray, IntArray
 from fuzzytree.numerics import U, outwards
 from fuzzytree.semantics import jet
@@ -94,7 +94,7 @@ class Stretches:
 
     def _exactly(self, lines: Lines) -> _Row:
         start, end = self._first, self._first + self.last_number
-        fine = refined(lines, self.axis.bends)
+        fine = refine(lines, self.axis.bends)
         parts = fine.at[start : end + 1], fine.after[start:end], fine.before[start:end]
         return _Row(*(np.array([float(v) for v in part]) for part in parts))
 
@@ -167,7 +167,7 @@ class Stretches:
         if not self._is_exact and not self.axis.values:
             return all(lines.is_flat for lines in every)
         xs = self.axis.bends
-        fine = every if self.axis.values else [refined(lines, xs) for lines in every]
+        fine = every if self.axis.values else [refine(lines, xs) for lines in every]
         values = (v for lines in fine for side in lines[1:] for v in side)
         return all(Fraction(float(v)) == v for v in values)
 

@@ -14,7 +14,7 @@ from fuzzytree.auditing.decide import measures
 from fuzzytree.auditing.decide.answers import ONE, ZERO
 from fuzzytree.auditing.decide.axes import function_lines
 from fuzzytree.auditing.decide.domain import span
-from fuzzytree.auditing.decide.lines import Between, Lines, combined, constant, lines_of
+from fuzzytree.auditing.decide.lines import Between, Lines, combine, constant, lines_of
 from fuzzytree.auditing.decide.measures import Bounds
 from fuzzytree.auditing.decide.states import (
     Bracket,
@@ -352,7 +352,7 @@ def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
     for of in ranges(subject):
         terms = of.terms
         curves = [of.lines(term.shape) for term in terms]
-        most = measures.most_shared(curves)
+        most = measures.most_overlap(curves)
         for a, b in itertools.combinations(range(len(terms)), 2):
             if most[a, b] < limit:
                 apart += 1
@@ -485,8 +485,8 @@ def coverage(of: VariableRange) -> Bounds:
     low, high = curves[0].lower.x[0], curves[0].lower.x[-1]
     level, totals = constant(ONE, low, high), list[Fraction]()
     for side in (0, 1):
-        lines = combined([curve[side] for curve in curves], _total)
-        below = measures.integral(combined([lines, level], min))
+        lines = combine([curve[side] for curve in curves], _total)
+        below = measures.integral(combine([lines, level], min))
         above = measures.integral(lines) - below  # of two terms or more
         totals.append(below - above / max(len(curves) - 1, 1))
     # Where degrees are enclosed, h differs by no more than their sum does.

@@ -17,7 +17,7 @@ from fuzzytree.auditing.decide.measures import (
     dips,
     height,
     integral,
-    most_shared,
+    most_overlap,
     overlap,
 )
 from fuzzytree.model import (
@@ -140,7 +140,7 @@ def test_bounds_of_two_curves_contain_exact_evaluations(n: int, count: int) -> N
 
 def test_no_two_curves_share_more_than_their_bound() -> None:
     made = [on_unit(curve) for curve in CURVES[::3]]
-    most = most_shared(made)
+    most = most_overlap(made)
     for a, b in itertools.combinations(range(len(made)), 2):
         result = overlap(made[a], made[b])
         if result is None:
@@ -150,7 +150,7 @@ def test_no_two_curves_share_more_than_their_bound() -> None:
 
 
 def test_nothing_is_known_of_shares_on_a_point() -> None:
-    assert (most_shared([lines_of(CURVES[0], ONE, ONE)] * 2) == 1.0).all()
+    assert (most_overlap([lines_of(CURVES[0], ONE, ONE)] * 2) == 1.0).all()
 
 
 def shapes(seed: int) -> list[Shape]:
