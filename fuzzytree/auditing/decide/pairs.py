@@ -66,7 +66,7 @@ class Columns:
 
     def __init__(self, axis: Axis, sets: Iterable[_Set]) -> None:
         self.axis = axis
-        self.sets = {one: n for n, one in enumerate(dict.fromkeys((_EMPTY, *sets)))}
+        self.sets = {own: n for n, own in enumerate(dict.fromkeys((_EMPTY, *sets)))}
         knots = axis.knots
         inside = [k for k, x in enumerate(knots) if axis.low <= x <= axis.high]
         values = [k for k in inside if axis.contains(knots[k])]
@@ -85,13 +85,13 @@ class Columns:
 
         self.low: list[_Values] = []
         self.high: list[_Values] = []
-        each = {
-            one: (columns(two.lower), columns(two.upper))
-            for one, two in axis.bounds.items()
+        sides = {
+            literal: (columns(both.lower), columns(both.upper))
+            for literal, both in axis.bounds.items()
         }
-        for one in self.sets:
+        for own in self.sets:
             for side, result in ((0, self.low), (1, self.high)):
-                rows = [each[literal][side] for literal, _ in one]
+                rows = [sides[literal][side] for literal, _ in own]
                 if len(rows) > 1:
                     rows = [[min(v) for v in zip(*rows, strict=True)]]
                 result.append(rows[0] if rows else [ONE] * len(self.x))
@@ -128,7 +128,7 @@ class Pairs:
         """Return some functions on an axis, on the knots of their literals alone."""
         key = name, frozenset(sets)
         if key not in self._columns:
-            literals = frozenset(literal for one in sets for literal, _ in one)
+            literals = frozenset(literal for own in sets for literal, _ in own)
             axis = self.base.axes[name].with_literals(literals)
             self._columns[key] = Columns(axis, sets)
         return self._columns[key]
@@ -152,9 +152,9 @@ class Pairs:
         factors = np.array([float(rule.factor) for rule in self.base.rules])
         result: FloatArray = np.minimum(factors[:, None], factors[None, :])
         for name, sets in self.sets.items():
-            places = {one: n for n, one in enumerate(dict.fromkeys(sets))}
+            places = {own: n for n, own in enumerate(dict.fromkeys(sets))}
             both = self._joint(self.base.axes[name], [*places])
-            of = np.array([places[one] for one in sets])
+            of = np.array([places[own] for own in sets])
             result = np.minimum(result, both[of[:, None], of[None, :]])
         return result
 
@@ -163,21 +163,21 @@ class Pairs:
         size = len(sets)
         result = np.ones((size, size))
         ends: dict[int, FloatArray] = {}
-        for n, one in enumerate(sets):
+        for n, own in enumerate(sets):
             rows = [
-                row for literal, _ in one for row in axis.stretches.sides[literal][1]
+                row for literal, _ in own for row in axis.stretches.sides[literal][1]
             ]
             if len(rows) == 1 and not axis.values:
                 ends[n] = rows[0].ends
             elif not rows:
                 ends[n] = np.ones((2, 2 * axis.stretches.last + 1))
-        for n, one in enumerate(sets):
+        for n, own in enumerate(sets):
             for m in range(n, size):
                 if n in ends and m in ends:
                     continue
-                columns = self.columns(axis.name, one, sets[m])
+                columns = self.columns(axis.name, own, sets[m])
                 least = np.minimum(
-                    *(columns.most[columns.sets[k]] for k in (one, sets[m]))
+                    *(columns.most[columns.sets[k]] for k in (own, sets[m]))
                 )
                 result[n, m] = result[m, n] = least.max()
         places = [*ends]
@@ -217,7 +217,7 @@ class Pairs:
         if most < level:
             return Common(most, most, None, Proved("the axes were looked at"))
         point = None if base.is_coupled else base.point(values)
-        reached = self._reached(i, j, point)
+        reached = self._level_at(i, j, point)
         is_exact = all(rule.norm == "minimum" for rule in rules) and not base.is_coupled
         is_exact &= all(base.axes[name].is_exact for name in values)
         if point is not None and reached == most:
@@ -228,9 +228,9 @@ class Pairs:
         drawn = np.minimum(base.sample_strengths[i], base.sample_strengths[j])
         tried = [answer.values, base.sample(int(drawn.argmax()))]
         tried += [point] if point is not None else []
-        points = [dict(one) for one in tried if base.contains(one)]
-        best = max(points, key=lambda one: self._reached(i, j, one))
-        reached = self._reached(i, j, best)
+        points = [dict(at) for at in tried if base.contains(at)]
+        best = max(points, key=lambda at: self._level_at(i, j, at))
+        reached = self._level_at(i, j, best)
         if is_exact:  # a limit at a jump, which none reaches, is told as such
             return Common(most, most, Point(best), answer)
         for _ in range(_HALVINGS):
@@ -240,14 +240,14 @@ class Pairs:
             other = self.claims.ask(Question((i, j), level=level), budget)
             if isinstance(other, Point):
                 best = dict(other.values)
-                reached = self._reached(i, j, best)
+                reached = self._level_at(i, j, best)
             elif isinstance(other, Proved):
                 most = level
             else:
                 break
         return Common(reached, most, Point(best), answer)
 
-    def _reached(self, i: int, j: int, point: dict[str, Fraction] | None) -> Fraction:
+    def _level_at(self, i: int, j: int, point: dict[str, Fraction] | None) -> Fraction:
         if point is None or not self.base.contains(point):
             return Fraction(-1)
         low, _ = self.base.strengths(point, (i, j))
@@ -320,9 +320,9 @@ class Pairs:
         rest = tuple(k for k in range(base.count) if k not in pair)
         is_lattice = all(rule.norm == "minimum" for rule in rules)
         pieces = {
-            axis: found
+            axis: where
             for axis in base.axes_in_use
-            if (found := self._shared(axis, *pair))
+            if (where := self._common_pieces(axis, *pair))
         }
         levels = self._plateaus(i) & self._plateaus(j) if is_lattice else set()
         levels = {t for t in levels if float(t) <= most + 1e-12}
@@ -348,7 +348,7 @@ class Pairs:
                 is_open |= isinstance(answer, Open)
             if not is_open:
                 return Proved("levels and cells with an interior")
-        drawn = self._drawn_tie(i, j, rest, budget)
+        drawn = self._tie_at_samples(i, j, rest, budget)
         if drawn is not None:
             return drawn
         answer = self.claims.ask(Question(pair, weak=rest), budget)
@@ -391,7 +391,7 @@ class Pairs:
             for literal, sides in axis.parts.items()
         }
 
-    def _shared(
+    def _common_pieces(
         self, axis: Axis, i: int, j: int
     ) -> tuple[tuple[Fraction, Fraction], ...]:
         """Return the pieces of an axis where two rules follow one line, not level."""
@@ -399,8 +399,8 @@ class Pairs:
         if axis.values or not (mine and theirs):
             return ()
         slopes = [
-            set().union(*(self._slopes[axis.name, literal] for literal, _ in one))
-            for one in (mine, theirs)
+            set().union(*(self._slopes[axis.name, literal] for literal, _ in own))
+            for own in (mine, theirs)
         ]
         if slopes[0].isdisjoint(slopes[1]):
             return ()
@@ -456,7 +456,7 @@ class Pairs:
                 return True
         return ONE in ratios
 
-    def _drawn_tie(
+    def _tie_at_samples(
         self, i: int, j: int, rest: tuple[int, ...], budget: Budget
     ) -> Answer | None:
         """Return a drawn point at which two rules tie, as they do all around it."""
@@ -473,8 +473,8 @@ class Pairs:
                 return SPENT
             around = [point, *_around(base.inputs, point)]
             if all(
-                base.contains(one) and question.holds(*base.strengths(one))
-                for one in around
+                base.contains(near) and question.holds(*base.strengths(near))
+                for near in around
             ):
                 return Point(point, "a point that was drawn, and points around it")
         return None
@@ -512,9 +512,9 @@ def _ratios(axis: Axis, mine: _Set, theirs: _Set) -> Iterator[Fraction]:
     first, last = (axis.knots.index(x) for x in (axis.low, axis.high))
     for k in range(first, last):
         ends = []
-        for one in (mine, theirs):
+        for own in (mine, theirs):
             p = q = ONE
-            for literal, _ in one:
+            for literal, _ in own:
                 lines = axis.bounds[literal].lower
                 p, q = lines.after[k], lines.before[k]
             ends.append((p, q))

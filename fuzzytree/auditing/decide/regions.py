@@ -71,7 +71,7 @@ def regions(tree: FuzzyTree) -> tuple[Region, ...]:
     return tuple(result)
 
 
-def common(one: Union, other: Union) -> Union:
+def common(first: Union, second: Union) -> Union:
     """Return what two unions of intervals have in common.
 
     Example:
@@ -80,7 +80,7 @@ def common(one: Union, other: Union) -> Union:
     """
     met = (
         (_later(a, b), _earlier(c, d))
-        for (a, c), (b, d) in itertools.product(one, other)
+        for (a, c), (b, d) in itertools.product(first, second)
     )
     return tuple(
         (low, high) for low, high in met if low is None or high is None or low < high

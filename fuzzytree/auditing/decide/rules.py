@@ -160,11 +160,11 @@ def _literal(proposition: Proposition, terms: _Terms) -> tuple[str, Literal]:
     if proposition.negated:
         hedges = hedges[1:]
     if hedges:
-        functions = tuple(_hedged(function, hedges) for function in functions)
+        functions = tuple(_with_hedges(function, hedges) for function in functions)
     return name, Literal(functions, proposition.negated)
 
 
-def _hedged(
+def _with_hedges(
     function: MembershipFunction, hedges: tuple[Hedge, ...]
 ) -> MembershipFunction:
     if isinstance(function, Hedged):
@@ -222,10 +222,11 @@ def _of_system(system: FuzzySystem) -> ModelRules:
                 if block.conjunction == "product" and len(way) > 1:
                     norm = "product"
                 weight = Fraction(rule.weight)
-                literals = tuple(_literal(one, terms) for one in way)
+                literals = tuple(_literal(proposition, terms) for proposition in way)
                 if norm == "minimum":
                     literals = tuple(
-                        (axis, replace(one, scale=weight)) for axis, one in literals
+                        (axis, replace(literal, scale=weight))
+                        for axis, literal in literals
                     )
                 made = BaseRule(literals, norm, weight, then, number, own, pairs)
                 rules.append(made._replace(when=way))
@@ -253,14 +254,14 @@ class _Conditions:
                 return self.ways(part, negated=negated)
             case And(parts=parts):
                 self._check("and", negated=negated)
-                return self._joined(parts, is_union=negated, negated=negated)
+                return self._join(parts, is_union=negated, negated=negated)
             case Or(parts=parts):
                 if self.block.disjunction == "maximum":
                     whole = self._one_proposition(parts, negated=negated)
                     if whole is not None:
                         return [(whole,)]
                 self._check("or", negated=negated)
-                return self._joined(parts, is_union=not negated, negated=negated)
+                return self._join(parts, is_union=not negated, negated=negated)
 
     def _proposition(self, proposition: Proposition, *, negated: bool) -> list[_Way]:
         name, hedges = proposition.variable, proposition.hedges
@@ -308,7 +309,7 @@ class _Conditions:
         if word == "or" and negated and block.conjunction == "product":
             _decline("FTD07", "it negates an 'or' within rules that multiply")
 
-    def _joined(
+    def _join(
         self, parts: Sequence[Condition], *, is_union: bool, negated: bool
     ) -> list[_Way]:
         whole: list[_Way] = [] if is_union else [()]

@@ -126,8 +126,8 @@ class Solver:
             ]
             lower, upper = (
                 functools.reduce(
-                    lambda one, other: self.z3.If(
-                        one <= other if literal.negated else one >= other, one, other
+                    lambda a, b: self.z3.If(
+                        a <= b if literal.negated else a >= b, a, b
                     ),
                     side,
                 )
@@ -235,9 +235,9 @@ class Solver:
                 for key in self.base.rules[place].literals:
                     solver.add(*self._of_literal(key))
             solver.add(formula)
-            before = _used(solver)
+            before = _cost(solver)
             result = solver.check()
-            budget.spend(min(max(_used(solver) - before, 0), most) // _PER_STEP + 100)
+            budget.spend(min(max(_cost(solver) - before, 0), most) // _PER_STEP + 100)
             values = []
             if result == z3.sat:
                 model, terms = solver.model(), self.inputs.values()
@@ -261,7 +261,7 @@ class Solver:
         return result
 
 
-def _used(solver: Any) -> int:
+def _cost(solver: Any) -> int:
     """Return the resources that z3 has used."""
     statistics = solver.statistics()
     keys = [statistics[n][0] for n in range(len(statistics))]

@@ -202,7 +202,7 @@ def point_of(result: Iterable[Coordinate]) -> dict[str, Fraction]:
         >>> point_of(coordinates({"x": Fraction(1, 3)}))
         {'x': Fraction(1, 3)}
     """
-    return {one.input: Fraction(one.exact) for one in result}
+    return {at.input: Fraction(at.exact) for at in result}
 
 
 # --- counts, numbers and names in sentences
@@ -233,11 +233,11 @@ def answer_text(label: str | None) -> str:
     return "no class" if label is None else repr(label)
 
 
-def listed(names: Sequence[str]) -> str:
+def names_text(names: Sequence[str]) -> str:
     """Return names as sentences show them.
 
     Example:
-        >>> listed(["a", "b"]), listed([])
+        >>> names_text(["a", "b"]), names_text([])
         ("'a', 'b'", 'none')
     """
     return ", ".join(map(repr, names)) or "none"

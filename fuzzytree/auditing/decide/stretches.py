@@ -65,7 +65,7 @@ class Stretches:
         self._places = {x: n for n, x in enumerate(axis.bends)}
         self._floats = np.array([float(x) for x in self.x])
         off = [abs(x - Fraction(float(x))) for x in self.x]
-        self._off = np.array([outwards(each)[1] for each in off])
+        self._off = np.array([outwards(gap)[1] for gap in off])
         count = len(axis.bends) * sum(len(parts[0]) for parts in axis.parts.values())
         self._is_exact = axis.is_exact and count <= _MOST_FRACTIONS
         rows: dict[int, _Row] = {}
@@ -199,7 +199,7 @@ class Stretches:
             extremes[:-1] = pick(extremes[:-1], after)
             extremes[1:] = pick(extremes[1:], before)
             self._tables[key] = _runs(extremes, pick)
-        extreme = _picked(self._tables[key], u, v, pick)
+        extreme = _extremes(self._tables[key], u, v, pick)
         return np.where(inside, pick(result, extreme), result)
 
     def slope(
@@ -214,8 +214,8 @@ class Stretches:
         )
         least, most = self._slopes[literal]
         return (
-            _picked(least, first, last, np.minimum),
-            _picked(most, first, last, np.maximum),
+            _extremes(least, first, last, np.minimum),
+            _extremes(most, first, last, np.maximum),
         )
 
     def _steps(self, literal: Literal) -> tuple[FloatArray, FloatArray]:
@@ -279,7 +279,7 @@ def _runs(row: FloatArray, pick: _Pick) -> FloatArray:
     return np.array(rows)
 
 
-def _picked(
+def _extremes(
     runs: FloatArray, first: IntArray, last: IntArray, pick: _Pick
 ) -> FloatArray:
     """Return extremes from each first to each last neighbour."""

@@ -17,7 +17,7 @@ import msgspec
 
 from fuzzytree.auditing.decide.domain import Domain, span
 from fuzzytree.auditing.decide.measures import curve_distance
-from fuzzytree.auditing.decide.states import answer_text, listed
+from fuzzytree.auditing.decide.states import answer_text, names_text
 from fuzzytree.auditing.diff.keys import Curves
 from fuzzytree.auditing.diff.matching import (
     CURVES,
@@ -166,10 +166,10 @@ class Structure:
             self._report_name(text, _Spot(("name",)))
         if isinstance(old, RuleBase) and isinstance(new, RuleBase):
             text = "the columns of the training table are"
-            columns = listed(old.columns), listed(new.columns)
+            columns = names_text(old.columns), names_text(new.columns)
             self._report_fact("columns", text, *columns, "never", "columns")
             if old.inputs != new.inputs and sorted(old.inputs) == sorted(new.inputs):
-                text = f"the inputs stand in another order: {listed(new.inputs)}"
+                text = f"the inputs stand in another order: {names_text(new.inputs)}"
                 here = _Spot(("variables",))
                 self._report("input", text, "never", here, here)
             self._compare_probabilities(old, new, matching)
@@ -202,7 +202,7 @@ class Structure:
         for text in texts:
             self._report("class", f"the class {text}", "always", here, here)
         if old.classes != new.classes and sorted(old.classes) == sorted(new.classes):
-            text = f"the classes have other numbers: {listed(new.classes)}"
+            text = f"the classes have other numbers: {names_text(new.classes)}"
             self._report("class", text, "never", here, here)
         return names
 
@@ -389,7 +389,9 @@ class Structure:
         if parts:
             noun, shown = "combination", "rules"
             text = f"the combination {spot.part.name!r}"
-            text += f" of {listed([part.input for part in parts])}" if is_new else ""
+            text += (
+                f" of {names_text([part.input for part in parts])}" if is_new else ""
+            )
         text += " is new" if is_new else " was removed"
         if is_new and noun == "input":
             text += ", so that rows need it"
@@ -401,8 +403,8 @@ class Structure:
         gone = [name for name in mine if name not in theirs]
         come = [name for name in theirs if name not in mine]
         text = f"{new.part.name!r} sums other inputs or weights"
-        text += f", without {listed(gone)}" if gone else ""
-        text += f", with {listed(come)}" if come else ""
+        text += f", without {names_text(gone)}" if gone else ""
+        text += f", with {names_text(come)}" if come else ""
         if not (gone or come):
             text += ": its weights, centres or order have changed"
         shown: Shown = "rules" if mine and theirs else "always"
@@ -469,7 +471,7 @@ class Structure:
         rules = tuple(sorted({number for term in terms for number in term.rules}))
         verb = "term was" if len(terms) == 1 else "terms were"
         verb += " added" if is_new else " removed"
-        names = listed([term.part.name for term in terms])
+        names = names_text([term.part.name for term in terms])
         text = f"of {of.part.name!r} {len(terms)} {verb}: {names}"
         text += "" if rules else ", which no rule uses"
         spot = _Spot((*of.path, "terms"), rules=rules)
