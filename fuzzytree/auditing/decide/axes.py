@@ -168,11 +168,9 @@ class Axis:
                 both = _coarser(both, self.most_pieces)
                 if literal.negated:
                     both = both.complement()
-                low = _literal_lines(both.lower, literal)
+                low = _adjust(both.lower, literal)
                 lower.append(low)
-                upper.append(
-                    low if both.is_exact else _literal_lines(both.upper, literal)
-                )
+                upper.append(low if both.is_exact else _adjust(both.upper, literal))
             result[literal] = self.kept[literal] = lower, upper
         return result
 
@@ -518,7 +516,7 @@ def _times(lines: Lines, by: Fraction) -> Lines:
     return Lines(lines.x, *parts)
 
 
-def _literal_lines(lines: Lines, literal: Literal) -> Lines:
+def _adjust(lines: Lines, literal: Literal) -> Lines:
     lines = _times(lines, literal.scale)
     if not literal.lowered:
         return lines
