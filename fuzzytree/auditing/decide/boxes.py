@@ -207,8 +207,8 @@ def by_boxes(
     twice = [len(rule.literals) > len(set(rule.literals)) for rule in base.rules]
     level = None if question.level is None else float(question.level)
     most, least = 1.0 + 1e-12, 1.0 - 1e-12
-    order = [*question.rivals, *question.weak]  # those that suffice come first
-    needed: dict[int, None] = {}
+    order = [*question.rivals, *question.weak]
+    needed: dict[int, None] = {}  # rivals that excluded a box, which are tried first
 
     def is_beaten(boxes: Boxes, j: int) -> BoolArray:
         """Return on which boxes a rival shows that there is no point."""
