@@ -50,7 +50,8 @@ def sentences(file: str) -> list[str]:
     ends = [(one.low or 0.0, 1.0 if one.high is None else one.high) for one in inputs]
     rows = np.array([chance.uniform(*pair, ROWS) for pair in ends])
     output, x = system.outputs[0], inputs[0]
-    seen = run_system(system)(rows).outputs[0]
+    seen = run_system(system)(rows).outputs
+    assert seen is not None
     low, high = np.nanmin(seen), np.nanmax(seen)
     slope = 3.0 * (high - low) / (ends[0][1] - ends[0][0])
     return [

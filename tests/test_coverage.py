@@ -29,7 +29,7 @@ from fuzzytree.model import (
     Variable,
 )
 from fuzzytree.model.agreement import Coverage
-from fuzzytree.model.contracts import SystemOutcome, SystemRun
+from fuzzytree.model.contracts import Outcome, Run
 from fuzzytree.model.rulebase import Part
 from fuzzytree.runtimes.programs import run_system
 from fuzzytree.semantics.inference import infer
@@ -166,10 +166,10 @@ def test_probing_thousands_of_rules_runs_fewer_rows_than_rules(
     block = RuleBlock(rules, "minimum")
     widths: list[int] = []
 
-    def counted(system: FuzzySystem, *, activations: bool) -> SystemRun:
-        run = run_system(system, activations=activations)
+    def counted(system: FuzzySystem) -> Run:
+        run = run_system(system)
 
-        def answer(values: FloatArray) -> SystemOutcome:
+        def answer(values: FloatArray) -> Outcome:
             widths.append(values.shape[1])
             return run(values)
 

@@ -26,7 +26,6 @@ from fuzzytree.model import (
     ModelSource,
     RuleBase,
     Runtime,
-    SystemRun,
     Variable,
     kind_of,
 )
@@ -34,13 +33,14 @@ from fuzzytree.runtimes import (
     OnnxModel,
     Outputs,
     Predictions,
+    answers_of,
     baseline,
     find_runtime,
     is_installed,
     joined,
     needed_by,
     open_onnx,
-    predictions_of,
+    outputs_of,
 )
 from fuzzytree.semantics import rules_from_tree
 from fuzzytree.tables import Batch, TableSource, batches, in_order
@@ -230,17 +230,15 @@ def prepare_answering(
         model = _rated(model)
     if isinstance(model, OnnxModel):
         return _answering_onnx(model, runtime, with_strengths=with_strengths)
-    if isinstance(model, FuzzySystem):
-        return _answering_system(model, runtime, with_strengths=with_strengths)
     is_short = not (with_strengths or with_probabilities)
     if runtime is None and isinstance(model, RuleBase) and is_short:
         runtime = "best-first"  # gives the same classes, rules and statuses
     used = _runtime(runtime or baseline().name, model)
-    execute = used.load(model)
+    execute = used.load(model, with_strengths=with_strengths or with_probabilities)
 
-    def answer(values: FloatArray) -> Predictions:
+    def answer(values: FloatArray) -> Predictions | Outputs:
         outcome = execute(np.ascontiguousarray(values))
-        return predictions_of(
+        return answers_of(
             outcome,
             model,
             with_strengths=with_strengths,
@@ -264,40 +262,6 @@ def _rated(model: Document | OnnxModel) -> Document | OnnxModel:
     return rules_from_tree(model) if isinstance(model, FuzzyTree) else model
 
 
-def _answering_system(
-    system: FuzzySystem, runtime: str | None, *, with_strengths: bool
-) -> Answering:
-    name = runtime or baseline().name
-    result = _runtime(name, system)
-    if result.load_system is None:
-        raise LossError(f"cannot run {system.name} in {name}: it runs no systems")
-    execute = result.load_system(system, activations=with_strengths)
-    names = tuple(one.name for one in system.outputs)
-    return _answering_numbers(
-        execute, system.inputs, (), names, is_parallel=result.is_reentrant
-    )
-
-
-def _answering_numbers(
-    execute: SystemRun,
-    inputs: tuple[str, ...],
-    trained: tuple[str, ...],
-    names: tuple[str, ...],
-    *,
-    is_parallel: bool = True,
-) -> Answering:
-    def answer(values: FloatArray) -> Outputs:
-        outcome = execute(np.ascontiguousarray(values))
-        return Outputs(
-            names,
-            outcome.outputs,
-            status=outcome.status,
-            strengths=outcome.activations,
-        )
-
-    return Answering(inputs, trained, answer, is_parallel)
-
-
 def _answering_onnx(
     model: OnnxModel, runtime: str | None, *, with_strengths: bool
 ) -> Answering:
@@ -306,14 +270,16 @@ def _answering_onnx(
             f"runtime {runtime!r}: an ONNX file runs in onnxruntime; "
             "other runtimes need the YAML file"
         )
-    execute, run = model.run_system, model.run_labelled
-    if execute is not None:
-        return _answering_numbers(execute, model.inputs, model.columns, model.names)
-    if run is None:
+    run = model.run_labelled
+    if run is None and model.representation != "system":
         raise ReadError(f"{model.name}: the ONNX file has no output 'label'")
     position: dict[str | None, int] = {name: k for k, name in enumerate(model.classes)}
 
-    def answer(values: FloatArray) -> Predictions:
+    def answer(values: FloatArray) -> Predictions | Outputs:
+        if run is None:
+            return outputs_of(
+                model.run(values), model.names, with_strengths=with_strengths
+            )
         outcome, labels = run(values)
         return Predictions(
             model.classes,

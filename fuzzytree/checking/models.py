@@ -249,7 +249,7 @@ class CheckedModel:
 
     def foreign(self, file: OnnxModel) -> str | None:
         """Return why an ONNX file cannot be one of this model; None if it can be."""
-        if file.run_system is not None:
+        if file.representation == "system":
             return "it answers the numbers of a fuzzy system, and the model a class"
         if file.inputs != self.model.inputs or file.classes != self.model.classes:
             return (

@@ -42,7 +42,6 @@ from fuzzytree.model import (
     Progress,
     RuleBase,
     Runtime,
-    SystemOutcome,
     checkpoint,
     fingerprint,
     kind_of,
@@ -251,7 +250,7 @@ def _shipped_onnx(subject: Checked, title: str, file: OnnxModel) -> Iterator[Fin
     yield from results
 
 
-def _count(title: str, outcome: Outcome | SystemOutcome) -> Count:
+def _count(title: str, outcome: Outcome) -> Count:
     kinds = (Status.TIE, Status.UNCOVERED, Status.MISSING)
     status = outcome.status
     return Count(title, status.size, *(int((status == one).sum()) for one in kinds))

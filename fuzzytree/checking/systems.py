@@ -32,11 +32,11 @@ from fuzzytree.model import (
     Coverage,
     FloatArray,
     FuzzySystem,
+    Outcome,
+    Run,
     Runtime,
-    SystemOutcome,
-    SystemRun,
 )
-from fuzzytree.runtimes import baseline, infer_rows, run_system
+from fuzzytree.runtimes import baseline, definition, run_system
 from fuzzytree.semantics import (
     ORIGIN,
     Aim,
@@ -67,7 +67,7 @@ class CheckedSystem:
 
     def __init__(self, model: FuzzySystem, data: FloatArray | None, limit: int) -> None:
         self.model = model
-        run = run_system(model, activations=True)
+        run = run_system(model)
         probes, self.coverage = _probes(model, run, limit)
         self.rows = row_set(model.inputs, probes, data)
         self.program = from_system(model, activations=True)
@@ -78,10 +78,9 @@ class CheckedSystem:
         """Return what to call the system in a runtime."""
         return runtime.name
 
-    def load(self, form: str, runtime: Runtime) -> SystemRun:
+    def load(self, form: str, runtime: Runtime) -> Run:
         """Return the system in a runtime."""
-        assert runtime.load_system is not None  # it runs systems
-        return runtime.load_system(self.model, activations=True)
+        return runtime.load(self.model)
 
     def share(self, form: str) -> slice:
         """Return the rows that a slow runtime gets, so that it ends in seconds."""
@@ -91,12 +90,12 @@ class CheckedSystem:
     def own(self) -> Iterator[Finding]:
         """Compare the native runtime with the inference, on a share of the rows."""
         some = self.rows.part(self.share("system"))
-        right = infer_rows(self.model, activations=True)(some.values)
+        right = definition().load(self.model)(some.values)
         actual = self.native.part(self.share("system"))
         yield from self._compared((self.base, "the inference"), actual, right, some)
 
     def compared(
-        self, form: str, runtime: Runtime, run: SystemRun, share: slice
+        self, form: str, runtime: Runtime, run: Run, share: slice
     ) -> Iterator[Finding]:
         """Compare the numbers of a runtime with the native ones."""
         if not (runtime.is_baseline or runtime.is_definition):
@@ -119,8 +118,8 @@ class CheckedSystem:
     def _compared(
         self,
         names: tuple[str, str],
-        actual: SystemOutcome,
-        right: SystemOutcome,
+        actual: Outcome,
+        right: Outcome,
         rows: RowSet,
     ) -> Iterator[Finding]:
         """Compare bits, then what the bounds of the rows that differ allow.
@@ -172,7 +171,7 @@ class CheckedSystem:
             yield counted("file", title, against, 1, (fault,))
             return
         has_all = len(other.rules) == len(system.rules)
-        actual = run_system(other, activations=has_all)(self.rows.values)
+        actual = run_system(other, with_strengths=has_all)(self.rows.values)
         names = (title, self.base)
         results = [*self._compared(names, actual, self.native, self.rows)]
         if is_equivalent(system, other):
@@ -185,7 +184,7 @@ class CheckedSystem:
         """Return why an ONNX file cannot be one of this system; None if it can be."""
         outputs = tuple(one.name for one in self.model.outputs)
         if (
-            file.run_system is not None
+            file.representation == "system"
             and file.inputs == self.model.inputs
             and file.names == outputs
         ):
@@ -205,8 +204,7 @@ class CheckedSystem:
         Raises:
             LossError: If onnxruntime cannot run it.
         """
-        assert file.run_system is not None  # `foreign` has tested it
-        actual, right = file.run_system(self.rows.values), self.native
+        actual, right = file.run(self.rows.values), self.native
         if "status" not in file.outputs:
             actual, right = (_without_status(one) for one in (actual, right))
         yield from self._compared((title, self.base), actual, right, self.rows)
@@ -225,8 +223,8 @@ class _Gaps:
     def __init__(
         self,
         subject: CheckedSystem,
-        actual: SystemOutcome,
-        right: SystemOutcome,
+        actual: Outcome,
+        right: Outcome,
         rows: RowSet,
     ) -> None:
         self.subject, self.rows = subject, rows
@@ -268,17 +266,18 @@ class _Gaps:
             if output.low is not None and output.high is not None:
                 spans[line] = output.high - output.low
             else:
-                numbers = self.subject.native.outputs[line]
+                numbers = self.two[line]
                 numbers = np.abs(numbers[np.isfinite(numbers)])
                 spans[line] = max(float(numbers.max(initial=0.0)), 1.0)
         return self.allowed > _EDGE * spans
 
 
-def _table(outcome: SystemOutcome, other: SystemOutcome) -> FloatArray:
+def _table(outcome: Outcome, other: Outcome) -> FloatArray:
     """Return all numbers that two outcomes have, a line each, the status last."""
+    assert outcome.outputs is not None  # it is of a system
     lines = [outcome.outputs]
-    if outcome.activations is not None and other.activations is not None:
-        lines.append(outcome.activations)
+    if outcome.strengths is not None and other.strengths is not None:
+        lines.append(outcome.strengths)
     return np.vstack([*lines, outcome.status.astype(np.float64)])
 
 
@@ -286,7 +285,7 @@ def _largest(numbers: FloatArray, which: BoolArray) -> float:
     return float(numbers[which].max(initial=0.0))
 
 
-def _without_status(outcome: SystemOutcome) -> SystemOutcome:
+def _without_status(outcome: Outcome) -> Outcome:
     """Return an outcome whose status marks missing rows alone."""
     is_missing = outcome.status == Status.MISSING
     return msgspec.structs.replace(
@@ -302,12 +301,10 @@ def coverage_of(system: FuzzySystem) -> Coverage:
         >>> coverage_of(all_samples()["Mamdani, singletons"]).unfired
         ()
     """
-    return _probes(system, run_system(system, activations=True), _FEW)[1]
+    return _probes(system, run_system(system), _FEW)[1]
 
 
-def _probes(
-    system: FuzzySystem, run: SystemRun, limit: int
-) -> tuple[FloatArray, Coverage]:
+def _probes(system: FuzzySystem, run: Run, limit: int) -> tuple[FloatArray, Coverage]:
     """Return probes, with more of them aimed at the rules that do not fire in these."""
     tables = [_values(system, system_probes(system, limit=limit))]
     fired = np.asarray(_fired(run, tables[0]).any(axis=1))
@@ -331,10 +328,10 @@ def _probes(
     return np.concatenate(tables, axis=1), coverage
 
 
-def _fired(run: SystemRun, values: FloatArray) -> BoolArray:
+def _fired(run: Run, values: FloatArray) -> BoolArray:
     """Return which rules fire in which rows, of shape (rules, rows)."""
-    degrees = run(values).activations
-    assert degrees is not None  # it was prepared with activations
+    degrees = run(values).strengths
+    assert degrees is not None  # systems give them
     fires: BoolArray = degrees > 0.0
     return fires
 

@@ -36,8 +36,6 @@ from .contracts import Progress as Progress
 from .contracts import Reading as Reading
 from .contracts import Run as Run
 from .contracts import Runtime as Runtime
-from .contracts import SystemOutcome as SystemOutcome
-from .contracts import SystemRun as SystemRun
 from .contracts import Written as Written
 from .contracts import kind_of as kind_of
 from .contracts import loss_text as loss_text

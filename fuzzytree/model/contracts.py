@@ -168,59 +168,40 @@ class Format(msgspec.Struct, frozen=True):
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """The answers of a runtime to many rows.
+    """The results of a runtime for many rows.
 
     Attributes:
-        rule: The number of the winning rule or leaf of each row, from 1; 0 for none.
-        status: A `fuzzytree.semantics.reference.Status` for each row.
-        strengths: Shape (rules, rows), or None where only the path was followed or
-            strengths were not requested. NaN in rows with missing values.
+        rule: The number of the winning rule or leaf of each row, from 1; 0 for none, as
+            for a fuzzy system.
+        status: A `fuzzytree.semantics.reference.Status` for each row. A row of a system
+            is decided, uncovered (a default or NaN answers an output) or missing.
+        strengths: Shape (rules, rows), of a system the degrees of activation of the
+            rules of all blocks; None where only the path was followed or strengths were
+            not requested. NaN in rows with missing values.
         probabilities: Shape (classes, rows), where the runtime computes them itself
             and they were requested. NaN in rows without a rule.
+        outputs: Shape (outputs, rows), the numbers of a system in its order; NaN
+            without number. None of what answers a class.
     """
 
     rule: IntArray
     status: IntArray
     strengths: FloatArray | None = None
     probabilities: FloatArray | None = None
+    outputs: FloatArray | None = None
 
     def part(self, rows: slice | IntArray) -> Outcome:
-        """Return the answers to some of the rows."""
-        strengths = None if self.strengths is None else self.strengths[:, rows]
-        mixed = None if self.probabilities is None else self.probabilities[:, rows]
-        return Outcome(self.rule[rows], self.status[rows], strengths, mixed)
+        """Return the results of some of the rows."""
+        arrays = msgspec.structs.asdict(self).items()
+        parts = {name: None if a is None else a[..., rows] for name, a in arrays}
+        return msgspec.structs.replace(self, **parts)
 
 
 Progress = Callable[[str, float], None]
 """Called with what is done next and the share that is done, in [0, 1]."""
 
 Run = Callable[["FloatArray"], Outcome]
-"""Answers to values of shape (inputs, rows), in the order of the model's inputs."""
-
-
-class SystemOutcome(msgspec.Struct, frozen=True):
-    """The numbers that a runtime gives for a fuzzy system and many rows.
-
-    Attributes:
-        outputs: Shape (outputs, rows), in the order of the system; NaN without number.
-        status: A `fuzzytree.semantics.reference.Status` for each row: decided,
-            uncovered (a default or NaN answers an output) or missing.
-        activations: Shape (rules, rows), of the rules of all blocks; None where they
-            were not requested. NaN in rows with missing values.
-    """
-
-    outputs: FloatArray
-    status: IntArray
-    activations: FloatArray | None = None
-
-    def part(self, rows: slice | IntArray) -> SystemOutcome:
-        """Return the answers to some of the rows."""
-        degrees = None if self.activations is None else self.activations[:, rows]
-        return SystemOutcome(self.outputs[:, rows], self.status[rows], degrees)
-
-
-SystemRun = Callable[["FloatArray"], SystemOutcome]
-"""Numbers for values of shape (columns, rows), in the order of the system's columns."""
+"""Results for values of shape (inputs, rows), in the order of the model's inputs."""
 
 
 class Prepared(msgspec.Struct, frozen=True):
@@ -242,13 +223,14 @@ class Prepared(msgspec.Struct, frozen=True):
     dtype: Dtype
 
 
-class SystemLoader(Protocol):
-    """Prepares a fuzzy system for many rows."""
+class Loader(Protocol):
+    """Prepares a model for many rows."""
 
-    def __call__(
-        self, system: FuzzySystem, /, *, activations: bool = False
-    ) -> SystemRun:
-        """Return what runs it, or raise LossError if it is outside its means."""
+    def __call__(self, model: Any, /, *, with_strengths: bool = True) -> Run:
+        """Return what runs a model, or raise LossError if it is outside its means.
+
+        Without `with_strengths` those that cost time are left out.
+        """
         ...
 
 
@@ -258,8 +240,7 @@ class Runtime(msgspec.Struct, frozen=True):
     Attributes:
         name: As in reports, such as `onnxruntime float32`.
         runs: Which models it can execute.
-        load: Prepare a tree or rules; raises LossError if it is outside its means.
-        load_system: Prepare a fuzzy system; None if it runs none.
+        load: Prepare a model of one of these kinds.
         dtype: The number type of degrees and strengths.
         bound: The largest difference of a strength that is allowed against the
             reference, for a model, and where it comes from; None demands equal bits
@@ -283,8 +264,7 @@ class Runtime(msgspec.Struct, frozen=True):
 
     name: str
     runs: tuple[ModelKind, ...]
-    load: Callable[[Model], Run]
-    load_system: SystemLoader | None = None
+    load: Loader
     dtype: Dtype = "float64"
     bound: Callable[[Model], tuple[float, str]] | None = None
     cannot: tuple[str, ...] = ()

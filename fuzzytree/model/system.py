@@ -202,6 +202,16 @@ class FuzzySystem(Value, frozen=True):
         return tuple(one.name for one in self.variables if not one.parts)
 
     @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of the training table: none, it is learnt from no table."""
+        return ()
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """The possible answers: none, its answers are numbers."""
+        return ()
+
+    @property
     def all_variables(self) -> tuple[Variable | SystemOutput, ...]:
         """The inputs and combinations, then the outputs."""
         return (*self.variables, *self.outputs)

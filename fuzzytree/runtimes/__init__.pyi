@@ -13,7 +13,9 @@ from .onnxruntime import texts_of as texts_of
 from .predictions import By as By
 from .predictions import Outputs as Outputs
 from .predictions import Predictions as Predictions
+from .predictions import answers_of as answers_of
 from .predictions import joined as joined
+from .predictions import outputs_of as outputs_of
 from .predictions import predictions_of as predictions_of
 from .predictions import reasons as reasons
 from .programs import ProgramPlan as ProgramPlan
@@ -21,13 +23,13 @@ from .programs import plan_program as plan_program
 from .programs import run_program as run_program
 from .programs import run_system as run_system
 from .python import load_content as load_content
-from .reference import infer_rows as infer_rows
 from .rows import Real as Real
 from .rows import axis_lines as axis_lines
 from .rows import plan_axes as plan_axes
 from .table import all_runtimes as all_runtimes
 from .table import baseline as baseline
 from .table import chosen_runtimes as chosen_runtimes
+from .table import definition as definition
 from .table import find_runtime as find_runtime
 from .table import is_installed as is_installed
 from .table import needed_by as needed_by

@@ -19,6 +19,7 @@ import numpy as np
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import write_c
 from fuzzytree.model import (
+    Document,
     FloatArray,
     FuzzySystem,
     Model,
@@ -26,10 +27,8 @@ from fuzzytree.model import (
     RuleBase,
     Run,
     Runtime,
-    SystemOutcome,
-    SystemRun,
 )
-from fuzzytree.runtimes.rows import checked
+from fuzzytree.runtimes.rows import checked, system_outcome
 from fuzzytree.runtimes.table import rules_only
 
 if TYPE_CHECKING:
@@ -93,22 +92,26 @@ found = fired ? model_strengths(row, fired) : model_decide(row);
 """
 
 
-def load(model: Model, dtype: Dtype = "float64", *, has_strengths: bool = True) -> Run:
+def load(
+    model: Document, dtype: Dtype = "float64", *, with_strengths: bool = True
+) -> Run:
     """Return a function that answers rows by compiled C.
 
-    Without `has_strengths` only the winner of a rule base is looked for.
+    Without `with_strengths` only the winner of a rule base is looked for.
 
     Raises:
         LossError: If float32 cannot represent a number of the model.
         MissingExtraError: If no compiler is installed.
         FuzzyTreeError: If the compiler fails.
     """
+    if isinstance(model, FuzzySystem):
+        return _load_system(model, with_strengths=with_strengths)
     try:
         written = write_c(model, dtype=dtype, name="model", selftest=False)
     except LossError as error:
         text = str(error).replace("cannot write", "cannot run", 1)
         raise LossError(text.partition("\n  pass allow_loss")[0]) from error
-    return load_content(written.content, model, dtype, has_strengths=has_strengths)
+    return load_content(written.content, model, dtype, with_strengths=with_strengths)
 
 
 def load_content(
@@ -117,7 +120,7 @@ def load_content(
     dtype: Dtype = "float64",
     *,
     prefix: str = "model",
-    has_strengths: bool = True,
+    with_strengths: bool = True,
 ) -> Run:
     """Return the same for a file that `fuzzytree.exporters.c` wrote of a model.
 
@@ -131,7 +134,7 @@ def load_content(
     loop = _LOOP.replace("FIND", find).replace("model_", f"{prefix}_")
     loop = loop.replace("MODEL_", f"{prefix.upper()}_")
     decide = compiled(content, loop, 4, function=f"{prefix}_many")
-    count = len(model.rules) if isinstance(model, RuleBase) and has_strengths else 0
+    count = len(model.rules) if isinstance(model, RuleBase) and with_strengths else 0
     real = np.dtype(dtype)
 
     def run(values: FloatArray) -> Outcome:
@@ -149,36 +152,29 @@ def load_content(
     return run
 
 
-def load_best_first(model: Model) -> Run:
+def load_best_first(model: Model, *, with_strengths: bool = False) -> Run:
     """Return a function that looks for the winner of a rule base alone.
 
     Raises:
         LossError: If the model is no rule base.
     """
     rules = rules_only(model, "c best-first", "searches")
-    return load(rules, has_strengths=False)
+    return load(rules, with_strengths=False)
 
 
-def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
-    """Return a function that answers rows of a fuzzy system by compiled C.
-
-    Raises:
-        MissingExtraError: If no compiler is installed.
-        FuzzyTreeError: If the compiler fails.
-    """
-    file = write_c(system, name="model", activations=activations, selftest=False)
+def _load_system(system: FuzzySystem, *, with_strengths: bool) -> Run:
+    """Return a function that answers rows of a fuzzy system by compiled C."""
+    file = write_c(system, name="model", activations=with_strengths, selftest=False)
     speed = "-O0" if len(file.content) > _LONG else "-O2"
     infer = compiled(file.content, _INFER_LOOP, 2, speed)
-    outputs = len(system.outputs)
-    count = outputs + activations * len(system.rules)
+    count = len(system.outputs) + with_strengths * len(system.rules)
 
-    def run(values: FloatArray) -> SystemOutcome:
+    def run(values: FloatArray) -> Outcome:
         inputs = np.ascontiguousarray(checked(values, system.inputs))
         rows = inputs.shape[1]
-        result, status = np.empty((count, rows)), np.empty(rows, np.int64)
-        infer(_at(inputs), rows, _at(result), _at(status))
-        degrees = result[outputs:] if activations else None
-        return SystemOutcome(result[:outputs], status, degrees)
+        numbers, status = np.empty((count, rows)), np.empty(rows, np.int64)
+        infer(_at(inputs), rows, _at(numbers), _at(status))
+        return system_outcome(system, np.vstack([numbers, status]))
 
     return run
 
@@ -233,7 +229,6 @@ RUNTIMES = (
         "c",
         ("tree", "rules", "system"),
         load,
-        load_system,
         programs=COMPILERS,
     ),
     Runtime(

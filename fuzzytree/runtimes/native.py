@@ -5,7 +5,15 @@ from __future__ import annotations
 from functools import partial
 
 from fuzzytree.errors import LossError
-from fuzzytree.model import Dtype, Model, RuleBase, Run, Runtime
+from fuzzytree.model import (
+    Document,
+    Dtype,
+    FuzzySystem,
+    Model,
+    RuleBase,
+    Run,
+    Runtime,
+)
 from fuzzytree.numerics import losses
 from fuzzytree.runtimes.best_first import search
 from fuzzytree.runtimes.descent import follow
@@ -14,14 +22,19 @@ from fuzzytree.runtimes.programs import run_system
 from fuzzytree.runtimes.table import rules_only
 
 
-def load(model: Model, dtype: Dtype = "float64") -> Run:
+def load(
+    model: Document, dtype: Dtype = "float64", *, with_strengths: bool = True
+) -> Run:
     """Return a function that answers many rows at once.
 
-    A tree is descended; of a rule base every rule is fired.
+    A tree is descended; of a rule base every rule is fired; of a fuzzy system the
+    program is run.
 
     Raises:
         LossError: If the type cannot hold the model.
     """
+    if isinstance(model, FuzzySystem):
+        return run_system(model, with_strengths=with_strengths)
     lost = losses(model, dtype)
     if lost:
         result = "; ".join(f"{loss.where}: {loss.what}" for loss in lost[:3])
@@ -32,7 +45,7 @@ def load(model: Model, dtype: Dtype = "float64") -> Run:
     return follow(model, dtype)
 
 
-def load_best_first(model: Model) -> Run:
+def load_best_first(model: Model, *, with_strengths: bool = False) -> Run:
     """Return a function that answers a rule base by searching it as a tree.
 
     Raises:
@@ -48,7 +61,6 @@ RUNTIMES = (
         "native",
         ("tree", "rules", "system"),
         load,
-        load_system=run_system,
         is_baseline=True,
         in_audits=True,
         is_reentrant=True,

@@ -19,6 +19,7 @@ from fuzzytree import exporters
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
 from fuzzytree.exporters import FORMAT_VERSION, OPERATORS, Output, write_onnx
 from fuzzytree.model import (
+    Document,
     Dtype,
     FloatArray,
     FuzzySystem,
@@ -30,8 +31,6 @@ from fuzzytree.model import (
     Run,
     Runtime,
     Semantics,
-    SystemOutcome,
-    SystemRun,
     Variable,
     text_fault,
 )
@@ -134,19 +133,16 @@ class OnnxModel(Facts, frozen=True, kw_only=True):
     Attributes:
         run: Answers to values of shape (inputs, rows), in the order of `inputs`.
             A file without the output `status` reports no ties, and an overflow as an
-            uncovered row. A fuzzy system has `run_system` instead, and this
-            raises ValueError.
+            uncovered row; of a fuzzy system it does not distinguish a default from a
+            number.
         run_labelled: The same with the file's own labels, None for "no class"; None in
             place of the function if the file has no output `label`.
         content: What runs: the file, written anew of what was read.
-        run_system: The numbers of a fuzzy system; None for trees and rules. A file
-            without the output `status` does not distinguish a default from a number.
     """
 
     run: Run
     run_labelled: Callable[[FloatArray], tuple[Outcome, Labels]] | None
     content: bytes
-    run_system: SystemRun | None = None
 
 
 def open_onnx(content: bytes, name: str) -> OnnxModel:
@@ -170,14 +166,13 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
     _check_signature(proto, facts, name)
 
     bare = open_session(proto, name, _rows_at_once(facts))
-    is_system, has_labels = facts.representation == "system", "label" in facts.outputs
-    refuse = functools.partial(_refuse, facts.name)
     return OnnxModel(
         **msgspec.structs.asdict(facts),
-        run=refuse if is_system else _runner(bare, facts),
-        run_labelled=_labelled_runner(bare, facts) if has_labels else None,
+        run=_runner(bare, facts),
+        run_labelled=(
+            _labelled_runner(bare, facts) if "label" in facts.outputs else None
+        ),
         content=proto.SerializeToString(),
-        run_system=_system_runner(bare, facts) if is_system else None,
     )
 
 
@@ -328,51 +323,31 @@ def _labelled_runner(
     return run
 
 
-def _outcome(outputs: Outputs, facts: Facts, values: FloatArray) -> Outcome:
-    rule, status = outputs["rule"], outputs.get("status")
+def _outcome(answers: Outputs, facts: Facts, values: FloatArray) -> Outcome:
+    outputs, status = answers.get("outputs"), answers.get("status")
+    if outputs is None:
+        rule, lacks_answer = answers["rule"], answers["rule"] == 0
+    else:
+        rule = np.zeros(outputs.shape[1], np.int64)
+        lacks_answer = np.isnan(outputs).any(axis=0)
     if status is None:
         status = np.zeros(len(rule), np.int64)
-        if not (rule.item() if len(rule) == 1 else rule.all()):
+        if lacks_answer.item() if len(rule) == 1 else lacks_answer.any():
             none = np.where(facts.known(values), 2, 3)
-            status = np.where(rule > 0, 0, none)
-    rated = outputs.get("probabilities")
-    return Outcome(rule, status, outputs.get("strengths"), rated)
+            status = np.where(lacks_answer, none, 0)
+    strengths = answers.get("strengths", answers.get("activations"))
+    return Outcome(rule, status, strengths, answers.get("probabilities"), outputs)
 
 
-def _refuse(name: str, values: FloatArray) -> Outcome:
-    raise ValueError(f"{name} is a fuzzy system: call run_system")
-
-
-def _system_runner(bare: exporters.Bare, facts: Facts) -> SystemRun:
-    call = _caller(bare, facts, facts.outputs)
-
-    def run(values: FloatArray) -> SystemOutcome:
-        values = checked(values, facts.inputs)
-        result = call(values)
-        outputs, status = result["outputs"], result.get("status")
-        if status is None:
-            is_known = np.isfinite(values).all(axis=0)
-            none = np.where(np.isnan(outputs).any(axis=0), 2, 0)
-            status = np.where(is_known, none, 3)
-        return SystemOutcome(outputs, status, result.get("activations"))
-
-    return run
-
-
-def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
-    """Write a fuzzy system as ONNX, in memory, and return what runs it.
-
-    Raises:
-        LossError: If the graph cannot hold the system.
-        MissingExtraError: If onnx or onnxruntime is not installed.
-    """
+def _load_system(system: FuzzySystem, *, with_strengths: bool) -> Run:
+    """Write a fuzzy system as ONNX, in memory, and return what runs it."""
     _require_packages("running")
 
     outputs: tuple[Output, ...] = ("outputs", "status", "activations")
-    outputs = outputs if activations else outputs[:2]
+    outputs = outputs if with_strengths else outputs[:2]
     content = write_onnx(system, outputs=outputs, verify=False).content
     facts = _facts(_decoded(content, system.name), system.name)
-    return _system_runner(exporters.open_bare(content), facts)
+    return _runner(exporters.open_bare(content), facts)
 
 
 def _rows_at_once(facts: Facts) -> int:
@@ -588,11 +563,16 @@ def _runtime(
     in_audits: bool = False,
 ) -> Runtime:
     make = functools.partial(prepare, dtype=dtype, readable=readable, plain=plain)
+
+    def load(model: Document, *, with_strengths: bool = True) -> Run:
+        if isinstance(model, FuzzySystem):
+            return _load_system(model, with_strengths=with_strengths)
+        return make(model, probabilities=True).run
+
     return Runtime(
-        load_system=load_system if "system" in runs else None,
         name=f"onnxruntime {name}",
         runs=runs,
-        load=lambda model: make(model, probabilities=True).run,
+        load=load,
         dtype=dtype,
         cannot=cannot,
         extra="onnx",

@@ -12,6 +12,8 @@ import msgspec
 import numpy as np
 
 from fuzzytree.model import (
+    Document,
+    FuzzySystem,
     Label,
     LabelType,
     Model,
@@ -270,6 +272,37 @@ def joined(parts: Sequence[S]) -> S:
             is_whole = all(column is not None for column in columns)
             arrays[name] = np.concatenate(columns, axis=-1) if is_whole else None
     return msgspec.structs.replace(parts[0], **arrays)
+
+
+def answers_of(
+    outcome: Outcome,
+    model: Document,
+    *,
+    with_strengths: bool = False,
+    with_probabilities: bool = False,
+) -> Predictions | Outputs:
+    """Name what an outcome answers: classes, or the numbers of a system."""
+    if isinstance(model, FuzzySystem):
+        return outputs_of(
+            outcome, [one.name for one in model.outputs], with_strengths=with_strengths
+        )
+    return predictions_of(
+        outcome,
+        model,
+        with_strengths=with_strengths,
+        with_probabilities=with_probabilities,
+    )
+
+
+def outputs_of(
+    outcome: Outcome, names: Sequence[str], *, with_strengths: bool = False
+) -> Outputs:
+    """Name the numbers of an outcome of a fuzzy system."""
+    assert outcome.outputs is not None  # every runtime of systems gives them
+    strengths = outcome.strengths if with_strengths else None
+    return Outputs(
+        tuple(names), outcome.outputs, status=outcome.status, strengths=strengths
+    )
 
 
 def predictions_of(

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model import FuzzySystem, SystemOutcome, SystemRun, checkpoint
-from fuzzytree.runtimes.rows import checked
+from fuzzytree.model import FuzzySystem, Outcome, Run, checkpoint
+from fuzzytree.runtimes.rows import checked, system_outcome
 from fuzzytree.semantics import (
     ARRAYS,
     Program,
@@ -191,7 +191,7 @@ def _still_value(numbers: StepValue | None) -> Values | None:
     return value.reshape(-1, 1) if isinstance(numbers, list) else value
 
 
-def run_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
+def run_system(system: FuzzySystem, /, *, with_strengths: bool = True) -> Run:
     """Return a function that runs a system's program in numpy.
 
     Example:
@@ -200,16 +200,10 @@ def run_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRu
         >>> run_system(random_system(3))(np.zeros((3, 2))).outputs.shape
         (2, 2)
     """
-    program = from_system(system, activations=activations)
-    plan = plan_program(program)
-    outputs, rules = len(system.outputs), len(system.rules)
+    plan = plan_program(from_system(system, activations=with_strengths))
 
-    def run(values: FloatArray) -> SystemOutcome:
-        results = run_program(plan, checked(values, system.inputs))
-        return SystemOutcome(
-            results[:outputs],
-            results[-1].astype(np.int64),
-            results[outputs : outputs + rules] if activations else None,
-        )
+    def run(values: FloatArray) -> Outcome:
+        numbers = run_program(plan, checked(values, system.inputs))
+        return system_outcome(system, numbers)
 
     return run

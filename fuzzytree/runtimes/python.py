@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     RowAnswer = tuple[str | None, int, int] | tuple[str | None, int, int, list[float]]
 
 
-def load(model: Model) -> Run:
+def load(model: Model, *, with_strengths: bool = True) -> Run:
     """Return a function that answers rows one after another by generated Python."""
     return load_content(write_python(model).content, model)
 

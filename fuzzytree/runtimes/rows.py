@@ -15,7 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.model import Model, Outcome, RuleBase, Variable, stand_ins
+from fuzzytree.model import (
+    FuzzySystem,
+    Model,
+    Outcome,
+    RuleBase,
+    Variable,
+    stand_ins,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -103,6 +110,22 @@ def outcome_of(
             raise FuzzyTreeError(f"it answers a {what} that is none of 0 to {most}")
     rule, status = table[:, :2].T.astype(np.int64)
     return Outcome(rule, status, strengths, probabilities if rated else None)
+
+
+def system_outcome(system: FuzzySystem, numbers: FloatArray) -> Outcome:
+    """Return the numbers of a fuzzy system as an outcome.
+
+    They have the order of the results of its program: outputs, activations of the rules
+    or none, status; shape (numbers, rows).
+    """
+    outputs, strengths = np.split(numbers[:-1], [len(system.outputs)])
+    status = numbers[-1].astype(np.int64)
+    return Outcome(
+        np.zeros_like(status),
+        status,
+        strengths if len(strengths) == len(system.rules) else None,
+        outputs=outputs,
+    )
 
 
 def _shown(names: Sequence[str]) -> str:

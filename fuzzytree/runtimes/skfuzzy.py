@@ -61,7 +61,7 @@ _CANNOT = (
 )
 
 
-def load(model: Model) -> Run:
+def load(model: Model, *, with_strengths: bool = True) -> Run:
     """Return a function that answers many rows by a scikit-fuzzy system.
 
     Raises:

@@ -59,6 +59,11 @@ def baseline(dtype: Dtype = "float64") -> Runtime:
     return next(one for one in every if one.is_baseline and one.dtype == dtype)
 
 
+def definition() -> Runtime:
+    """Return the runtime that evaluates the definition, row by row."""
+    return next(runtime for runtime in all_runtimes() if runtime.is_definition)
+
+
 def chosen_runtimes(names: Sequence[str] | None) -> tuple[Runtime, ...]:
     """Return the runtimes of those names; all of the table if None.
 

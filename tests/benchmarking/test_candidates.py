@@ -79,7 +79,7 @@ def test_all_rows_of_a_rule_base_are_timed_block_by_block() -> None:
     rules = rules_from_tree(TREE)
     calls: list[tuple[int, ...]] = []
 
-    def counted(model: object) -> Run:
+    def counted(model: object, *, with_strengths: bool = True) -> Run:
         def run(values: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Outcome:
             calls.append(values.shape)
             return Outcome(np.zeros(1, np.int64), np.zeros(1, np.int64))

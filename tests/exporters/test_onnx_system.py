@@ -35,7 +35,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.runtimes.reference import infer_rows
+from fuzzytree.runtimes.reference import load as infer_rows
 from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.testing import random_rows, random_system
 
@@ -87,9 +87,8 @@ def test_a_degree_of_one_by_something_is_rounded_before_it_is_multiplied() -> No
     columns = np.random.default_rng(0).uniform(0.0, 9.0, (2, 500))
     content = write_onnx(system, outputs=("outputs", "activations")).content
     opened = open_onnx(content, "s.onnx")
-    assert opened.run_system is not None
-    right = infer_rows(system, activations=True)(columns).activations
-    found = opened.run_system(columns).activations
+    right = infer_rows(system)(columns).strengths
+    found = opened.run(columns).strengths
     assert found is not None
     np.testing.assert_array_equal(found, right)
 
@@ -122,16 +121,15 @@ def test_an_opened_file_runs() -> None:
     assert (opened.representation, opened.names) == ("system", ("y1", "y2"))
     rows = random_rows(SYSTEM, 0, 50)
     values = np.array([[row[name] for row in rows] for name in SYSTEM.inputs])
-    assert opened.run_system is not None
-    found = opened.run_system(values)
-    right = infer_rows(SYSTEM, activations=True)(values)
-    assert found.activations is not None
-    assert right.activations is not None
+    found = opened.run(values)
+    right = infer_rows(SYSTEM)(values)
+    assert found.strengths is not None
+    assert found.outputs is not None
+    assert right.strengths is not None
+    assert right.outputs is not None
     np.testing.assert_allclose(found.outputs, right.outputs, rtol=1e-12)
-    np.testing.assert_allclose(found.activations, right.activations, rtol=1e-12)
+    np.testing.assert_allclose(found.strengths, right.strengths, rtol=1e-12)
     assert found.status.tolist() == right.status.tolist()
-    with pytest.raises(ValueError, match="is a fuzzy system: call run_system"):
-        opened.run(values)
 
 
 @pytest.mark.one_in(8)
@@ -223,8 +221,7 @@ def test_a_file_that_lies_about_itself_is_refused(
 
 def _run(content: bytes) -> None:
     opened = open_onnx(content, "s.onnx")
-    assert opened.run_system is not None
-    opened.run_system(np.zeros((3, 2)))
+    opened.run(np.zeros((3, 2)))
 
 
 def grid_system(
@@ -266,11 +263,10 @@ def test_a_graph_of_many_rules_gives_the_bits_of_the_inference(
     assert is_wide(from_system(system))
     opened = open_onnx(write_onnx(system, outputs=ALL, opset=opset).content, "g.onnx")
     values = np.array([[0.0, -0.0, 3.25, 23.5, np.nan, 99.0], [7.5, 1.0, 3, 22, 1, 1]])
-    right = infer_rows(system, activations=True)(values)
-    assert opened.run_system is not None
-    found = opened.run_system(values)
+    right = infer_rows(system)(values)
+    found = opened.run(values)
     np.testing.assert_array_equal(found.outputs, right.outputs)
-    np.testing.assert_array_equal(found.activations, right.activations)
+    np.testing.assert_array_equal(found.strengths, right.strengths)
     assert found.status.tolist() == right.status.tolist()
 
 

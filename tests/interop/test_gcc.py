@@ -28,7 +28,6 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes.c import load_system
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -354,9 +353,9 @@ def test_compiled_systems_have_the_references_numbers(program: Need, name: str) 
     assert len(rows) >= 20
     values = np.array([[row[column] for row in rows] for column in system.inputs])
     values = values.reshape(len(system.inputs), len(rows))
-    found = load_system(system, activations=True)(values)
-    assert found.activations is not None
-    assert len(found.activations) == len(system.rules)
+    found = find_runtime("c").load(system)(values)
+    assert found.strengths is not None
+    assert len(found.strengths) == len(system.rules)
     for row, numbers in zip(rows, found.outputs.T, strict=True):
         expected = infer(system, row).outputs
         for ours, theirs in zip(expected, numbers.tolist(), strict=True):

@@ -53,7 +53,7 @@ from fuzzytree.model import (
     sampled_values,
 )
 from fuzzytree.numerics import outwards
-from fuzzytree.runtimes import run_system
+from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import joined_outputs, system_probes
 
 _PROBES = 2_000  # of each system
@@ -231,7 +231,8 @@ class _Numbers(Differences):
         self.pair, self.outputs = pair, outputs
         self.is_rounded = np.array(is_rounded)
         self.systems = (pair.old, pair.new)
-        self.runs = [run_system(system) for system in self.systems]
+        load = baseline().load
+        self.runs = [load(system, with_strengths=False) for system in self.systems]
         self.largest: dict[str, tuple[float, dict[str, float]]] = {}
         self.rounding = 0.0
 
@@ -257,6 +258,7 @@ class _Numbers(Differences):
         for system, run in zip(self.systems, self.runs, strict=True):
             names = [output.name for output in system.outputs]
             outputs = run(self.pair.rows_of(system, values)).outputs
+            assert outputs is not None  # both are systems
             numbers.append(outputs[[names.index(name) for name in self.outputs]])
         return numbers
 

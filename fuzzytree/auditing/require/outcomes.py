@@ -46,7 +46,7 @@ from fuzzytree.auditing.require.search import (
     prediction_texts,
 )
 from fuzzytree.model import BoolArray, FloatArray, FuzzySystem, FuzzyTree, Linear
-from fuzzytree.runtimes import run_system
+from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import Status
 
 ROUNDING = 1e-9
@@ -257,7 +257,7 @@ def _values(side: DomainSide, union: Union) -> list[float]:
 
 def coverage_outcome(search: Search, system: FuzzySystem) -> Outcome:
     """Return whether every output of a system has a number that rules conclude."""
-    run = run_system(system)
+    run = baseline().load(system, with_strengths=False)
 
     def loss(rows: Rows) -> FloatArray:
         return np.where(run(rows[:, 0]).status == Status.UNCOVERED, 1.0, -1.0)

@@ -8,7 +8,7 @@ import io
 import math
 from collections.abc import Callable, Collection, Mapping
 from fractions import Fraction
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from fuzzytree.model import (
     FuzzyTree,
     Variable,
 )
-from fuzzytree.runtimes import baseline, run_system
+from fuzzytree.runtimes import baseline
 
 _NEAR = 1024  # rows drawn near the worst of them
 _SHARES = (0.25, 0.1, 0.03, 0.01)  # of the ranges, in which rows are drawn next
@@ -176,8 +176,8 @@ def predictor(model: Document) -> Callable[[FloatArray], FloatArray]:
     position of the class, behind all of them for none.
     """
     if isinstance(model, FuzzySystem):
-        system = run_system(model)
-        return lambda rows: system(rows).outputs
+        numbers = baseline().load(model, with_strengths=False)
+        return lambda rows: cast("FloatArray", numbers(rows).outputs)
     run = baseline().load(model)
     labels = [model.semantics.uncovered]
     if isinstance(model, FuzzyTree):

@@ -131,7 +131,8 @@ def system(seed: int) -> FuzzySystem:
 
 def numbers(model: FuzzySystem, rows: FloatArray) -> FloatArray:
     """Return the output of each row."""
-    outputs: FloatArray = run_system(model)(rows).outputs
+    outputs = run_system(model)(rows).outputs
+    assert outputs is not None
     return np.array(outputs[0])
 
 

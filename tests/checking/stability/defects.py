@@ -77,7 +77,7 @@ def runtime(
 ) -> Runtime:
     """Return the native runtime with one defect."""
 
-    def load(model: Model) -> Run:
+    def load(model: Model, *, with_strengths: bool = True) -> Run:
         return change(model, NATIVE.load(model))
 
     return Runtime("defective", ("tree", "rules"), load, dtype=dtype)
@@ -134,7 +134,7 @@ WARNS = runtime(_warning)
 def by_terms(degree: Callable[[Band | LR, float], float]) -> Runtime:
     """Return a slow runtime for rules whose degrees come from a function."""
 
-    def load(model: Model) -> Run:
+    def load(model: Model, *, with_strengths: bool = True) -> Run:
         assert isinstance(model, RuleBase)
         shapes = {(v.name, t.name): t.shape for v in model.variables for t in v.terms}
 
