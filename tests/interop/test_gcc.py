@@ -355,6 +355,7 @@ def test_compiled_systems_have_the_references_numbers(program: Need, name: str) 
     values = values.reshape(len(system.inputs), len(rows))
     found = find_runtime("c").load(system)(values)
     assert found.strengths is not None
+    assert found.outputs is not None
     assert len(found.strengths) == len(system.rules)
     for row, numbers in zip(rows, found.outputs.T, strict=True):
         expected = infer(system, row).outputs

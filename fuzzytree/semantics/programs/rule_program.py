@@ -1,7 +1,4 @@
-"""A rule base as a program: every rule is fired, the first of the strongest wins.
-
-A tree is no program, for a row passes few of its nodes; the values of its nodes are.
-"""
+"""A rule base as a program: every rule is fired, the first of the strongest wins."""
 
 from __future__ import annotations
 
