@@ -40,7 +40,6 @@ from fuzzytree.model import (
     Conjunction,
     Document,
     Dtype,
-    FuzzySystem,
     FuzzyTree,
     Kind,
     Model,
@@ -698,7 +697,7 @@ def audited_rows(
         )
     place = known.index(target)
     labels = class_names([batch.piece.cells[place] for batch in result])
-    classes = () if isinstance(model, FuzzySystem) else model.classes
+    classes = model.classes
     numbers = {label: number for number, label in enumerate(classes)}
     codes = np.array([numbers.get(label or "", -1) for label in labels], np.int64)
     if classes and not np.any(codes >= 0):

@@ -164,6 +164,25 @@ class RuleBase(Value, frozen=True):
         """The names of the columns that the rules need, in order."""
         return tuple(v.name for v in self.variables if not v.parts)
 
+    @property
+    def outputs(self) -> tuple[()]:
+        """The numbers that it computes: none, its answers are classes."""
+        return ()
+
+    @property
+    def sets(self) -> tuple[()]:
+        """The fitted sets that it keeps beside its terms: none."""
+        return ()
+
+    @property
+    def rule_labels(self) -> tuple[str, ...]:
+        """The class of each rule, in order."""
+        return tuple(rule.then for rule in self.rules)
+
+    def rule_path(self, number: int) -> Path:
+        """Return where the rule of a number, from 1, stands in the model."""
+        return ("rules", number - 1)
+
     def __repr__(self) -> str:
         """Show how much it holds; `str` shows the rules."""
         rules, inputs = len(self.rules), len(self.inputs)

@@ -221,6 +221,24 @@ class FuzzySystem(Value, frozen=True):
         """The rules of all blocks, in order."""
         return tuple(rule for block in self.blocks for rule in block.rules)
 
+    @property
+    def sets(self) -> tuple[()]:
+        """The fitted sets that it keeps beside its terms: none."""
+        return ()
+
+    @property
+    def rule_labels(self) -> tuple[str, ...]:
+        """The class of each rule: none, its answers are numbers."""
+        return ()
+
+    def rule_path(self, number: int) -> Path:
+        """Return where the rule of a number, from 1 over all blocks, stands."""
+        for position, block in enumerate(self.blocks):
+            if number <= len(block.rules):
+                return ("blocks", position, "rules", number - 1)
+            number -= len(block.rules)
+        return ("blocks",)
+
     def __repr__(self) -> str:
         """Show how much it holds."""
         return summary(

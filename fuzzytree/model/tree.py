@@ -151,6 +151,25 @@ class FuzzyTree(Value, frozen=True):
         """The names of the columns that the tree needs, in order."""
         return tuple(v.name for v in self.variables if not v.parts)
 
+    @property
+    def outputs(self) -> tuple[()]:
+        """The numbers that it computes: none, its answers are classes."""
+        return ()
+
+    @property
+    def rules(self) -> tuple[()]:
+        """The rules that fire for a row: none, for one path is followed."""
+        return ()
+
+    @property
+    def rule_labels(self) -> tuple[str, ...]:
+        """The class of each leaf, in order."""
+        return tuple(leaf.label for leaf in self.leaves)
+
+    def rule_path(self, number: int) -> Path:
+        """Return where the leaf of a number, from 1, stands in the model."""
+        return ("leaves", number - 1)
+
     def __repr__(self) -> str:
         """Show how much it holds; `str` shows the outline."""
         return summary(

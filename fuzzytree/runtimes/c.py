@@ -24,7 +24,6 @@ from fuzzytree.model import (
     FuzzySystem,
     Model,
     Outcome,
-    RuleBase,
     Run,
     Runtime,
 )
@@ -130,11 +129,11 @@ def load_content(
         MissingExtraError: As `load`.
         FuzzyTreeError: As `load`.
     """
-    find = _EITHER if isinstance(model, RuleBase) else _DECIDE
+    find = _EITHER if model.rules else _DECIDE
     loop = _LOOP.replace("FIND", find).replace("model_", f"{prefix}_")
     loop = loop.replace("MODEL_", f"{prefix.upper()}_")
     decide = compiled(content, loop, 4, function=f"{prefix}_many")
-    count = len(model.rules) if isinstance(model, RuleBase) and with_strengths else 0
+    count = len(model.rules) if with_strengths else 0
     real = np.dtype(dtype)
 
     def run(values: FloatArray) -> Outcome:

@@ -282,10 +282,9 @@ def answers_of(
     with_probabilities: bool = False,
 ) -> Predictions | Outputs:
     """Name what an outcome answers: classes, or the numbers of a system."""
+    names = [output.name for output in model.outputs]
     if isinstance(model, FuzzySystem):
-        return outputs_of(
-            outcome, [one.name for one in model.outputs], with_strengths=with_strengths
-        )
+        return outputs_of(outcome, names, with_strengths=with_strengths)
     return predictions_of(
         outcome,
         model,
@@ -316,13 +315,9 @@ def predictions_of(
 
     Probabilities need the strengths of a rule base that has them.
     """
-    if isinstance(model, RuleBase):
-        ends = [rule.then for rule in model.rules]
-    else:
-        ends = [leaf.label for leaf in model.leaves]
     semantics = model.semantics
     position = {name: k for k, name in enumerate(model.classes)}
-    owners = tuple(position[end] for end in ends)
+    owners = tuple(map(position.__getitem__, model.rule_labels))
     codes = np.array([-1, *owners], np.int64)[outcome.rule]
     for status, answer in (
         (Status.UNCOVERED, semantics.uncovered),

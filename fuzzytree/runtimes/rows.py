@@ -19,7 +19,6 @@ from fuzzytree.model import (
     FuzzySystem,
     Model,
     Outcome,
-    RuleBase,
     Variable,
     stand_ins,
 )
@@ -93,7 +92,7 @@ def outcome_of(
     Raises:
         FuzzyTreeError: If there are more or fewer strengths than rules.
     """
-    count = len(model.rules) if isinstance(model, RuleBase) else 0
+    count = len(model.rules)
     rated = len(model.classes) if has_probabilities else 0
     width = len(rows[0]) if rows else 2 + count + rated
     whole = np.array(rows, np.float64).reshape(len(rows), width)
@@ -101,7 +100,7 @@ def outcome_of(
     if table.shape[1] not in (2, 2 + count):
         raise FuzzyTreeError(f"it gives {table.shape[1] - 2} strengths, not {count}")
     strengths = table[:, 2:].T if table.shape[1] > 2 else None
-    last = len(model.rules if isinstance(model, RuleBase) else model.leaves)
+    last = len(model.rule_labels)
     for what, numbers, most in (
         ("rule", table[:, 0], last),
         ("status", table[:, 1], 3),

@@ -30,7 +30,6 @@ from fuzzytree.model import (
     Model,
     Option,
     Outcome,
-    RuleBase,
     Variable,
     unlike,
 )
@@ -258,8 +257,7 @@ def _pmml(
     table = pandas.DataFrame(numbers | columns)
     result = evaluator.evaluateAll(table, error_col=None)[0]
     labels = tuple(None if one != one else one for one in result["answer"])
-    count = len(model.rules) if isinstance(model, RuleBase) else 0
-    names = [f"strength of rule {k}" for k in range(1, count + 1)]
+    names = [f"strength of rule {k}" for k in range(1, len(model.rules) + 1)]
     is_rated = _is_rated(options)
     shares = [f"probability of class {c}" for c in model.classes if is_rated]
     inputs = [one for one in model.variables if not one.parts]

@@ -15,7 +15,7 @@ from pathlib import Path as File
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.auditing.findings.locations import model_file, rule_path, term_path
+from fuzzytree.auditing.findings.locations import model_file, term_path
 from fuzzytree.auditing.findings.records import TermName
 from fuzzytree.checking.converting import format_of, load_content
 from fuzzytree.errors import LossError
@@ -136,7 +136,7 @@ def spots_of(
     system = as_system(model, "winner") if isinstance(model, RuleBase) else model
     assert isinstance(system, FuzzySystem)
     parts: list[tuple[str, object, tuple[str | int, ...]]] = [
-        ("rule", rule, rule_path(model, number))
+        ("rule", rule, model.rule_path(number))
         for number, rule in enumerate(system.rules, 1)
     ]
     for one in system.all_variables if system is model else system.variables:
@@ -263,7 +263,7 @@ def test_rules_of_a_rule_base_stand_in_the_file_that_was_made_of_it(
     seen: list[tuple[int, int]] = []
     lines = content.decode().split("\n")
     for number, rule in enumerate(again.rules, 1):
-        place = file.place(rule_path(again, number))
+        place = file.place(again.rule_path(number))
         assert place is not None
         text = re.sub(
             "[^a-z0-9]", "", lines[place.line - 1][place.column - 1 :].lower()

@@ -23,7 +23,7 @@ from fuzzytree.api.answering import Answering, prepare_answering
 from fuzzytree.api.engines import Engine, engine_of
 from fuzzytree.errors import FuzzyTreeError, TableError
 from fuzzytree.learning import Learner, LearningSettings
-from fuzzytree.model import FuzzyTree, Model, label_of
+from fuzzytree.model import Model, label_of
 from fuzzytree.runtimes import Predictions, joined
 
 if TYPE_CHECKING:
@@ -177,8 +177,7 @@ class Predictor:
 
     @cached_property
     def _ready(self) -> Answering:
-        is_tree = isinstance(self.model, FuzzyTree)
-        return prepare_answering(self.model, with_strengths=not is_tree)
+        return prepare_answering(self.model, with_strengths=bool(self.model.rules))
 
     def __call__(self, batch: pa.RecordBatch) -> pa.RecordBatch:
         """Return a batch with the predictions beside its columns."""

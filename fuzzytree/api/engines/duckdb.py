@@ -15,7 +15,7 @@ from fuzzytree.cells import number_of
 from fuzzytree.checking import export
 from fuzzytree.columns import BOOLEANS
 from fuzzytree.errors import TableError
-from fuzzytree.model import DATE_UNIT, FuzzyTree, Variable
+from fuzzytree.model import DATE_UNIT, Variable
 from fuzzytree.semantics import Status
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def prediction_query(
         value = _input(cell, title, is_long, variables[title])
         columns.append(f"{value} AS {_quoted(title)}")
     model = predictor.model
-    rules = () if isinstance(model, FuzzyTree) else range(1, len(model.rules) + 1)
+    rules = range(1, len(model.rules) + 1)
     sql = export(
         model,
         "sql",

@@ -21,7 +21,7 @@ from fuzzytree.auditing.decide.axes import (
 from fuzzytree.auditing.decide.domain import Domain, combination
 from fuzzytree.auditing.decide.lines import Lines
 from fuzzytree.auditing.decide.rules import BaseRule, LeftOut, Literal, rules_of
-from fuzzytree.model import BoolArray, Document, FloatArray, FuzzySystem, Variable
+from fuzzytree.model import BoolArray, Document, FloatArray, Variable
 
 SAMPLES = 4096
 """Points that are drawn, which find most of what there is to find."""
@@ -93,8 +93,7 @@ class Base:
         variables = {variable.name: variable for variable in model.variables}
         base = cls(every.rules, variables, domain, seed=seed)
         base.silent, base.left_out = every.silent, every.left_out
-        if not isinstance(model, FuzzySystem):
-            base.uncovered = model.semantics.uncovered
+        base.uncovered = every.uncovered
         return base
 
     @classmethod

@@ -28,6 +28,7 @@ from fuzzytree.auditing.decide.boxes import Boxes
 from fuzzytree.auditing.decide.rules import rules_of
 from fuzzytree.model import (
     Conclusion,
+    Document,
     FloatArray,
     FuzzySystem,
     Linear,
@@ -86,7 +87,7 @@ class OutputBounds:
         self, base: Base, system: FuzzySystem, name: str, *, model: int = 0
     ) -> None:
         self.base, self.system = base, system
-        self.output = next(of for of in system.outputs if of.name == name)
+        self.output = next(output for output in system.outputs if output.name == name)
         self.is_weighted = self.output.defuzzifier.is_weighted
         self.is_sum = self.output.defuzzifier.method == "weighted sum"
         for obstacle in self._obstacles():
@@ -302,12 +303,12 @@ def rule_change(boxes: Boxes, place: int, name: str) -> Change:
     return -largest([-change for change in changes])
 
 
-def scale_of(system: FuzzySystem, name: str) -> float:
+def scale_of(model: Document, name: str) -> float:
     """Return the largest number of an output, by which its rounding is judged."""
-    output = next(of for of in system.outputs if of.name == name)
+    output = next(output for output in model.outputs if output.name == name)
     ends = [
         max(abs(variable.low or 0.0), abs(variable.high or 0.0))
-        for variable in system.variables
+        for variable in model.variables
         if not variable.parts
     ]
     sizes = [abs(output.low or 0.0), abs(output.high or 0.0)]

@@ -104,6 +104,7 @@ class ModelRules(NamedTuple):
     rules: tuple[BaseRule, ...]
     silent: tuple[tuple[str, int, str], ...] = ()
     left_out: tuple[LeftOut, ...] = ()
+    uncovered: str | None = None
 
 
 def rules_of(model: Document) -> ModelRules:
@@ -132,7 +133,7 @@ def rules_of(model: Document) -> ModelRules:
                 )
                 for number, rule in enumerate(model.rules, 1)
             ]
-            return ModelRules(tuple(every))
+            return ModelRules(tuple(every), uncovered=model.semantics.uncovered)
         case FuzzySystem():
             return _of_system(model)
 

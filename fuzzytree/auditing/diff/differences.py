@@ -138,7 +138,7 @@ def difference(
             systems = Pair(first, second, inputs, domain)
             answers, evidence = number_answers(systems, rows, settings, budget, report)
         case _:
-            place = [isinstance(model, FuzzySystem) for model in both].index(True)
+            place = [bool(model.outputs) for model in both].index(True)
             file = files[place]
             raise ReadError(
                 f"{file.name if file else models[place].name}: is a fuzzy system whose "

@@ -75,7 +75,7 @@ class Structure:
     ) -> None:
         self.domain, self.evidence = domain, evidence
         self.models, self.files = models, files
-        self.is_system, self.curves = isinstance(new, FuzzySystem), Curves()
+        self.is_system, self.curves = bool(new.outputs), Curves()
         self.users: list[dict[tuple[str, str], tuple[int, ...]]] = []
         for model in (old, new):
             users: defaultdict[tuple[str, str], tuple[int, ...]] = defaultdict(tuple)
@@ -124,12 +124,10 @@ class Structure:
         file, model = self.files[side], self.models[side]
         if file is None or spot is None or not spot.path:
             return None
-        path = spot.path
-        if path[0] == "rules" and isinstance(model, FuzzyTree):
-            path = ("leaves", *path[1:])
-        elif path[0] == "rules" and isinstance(model, FuzzySystem):
-            path = ("blocks", 0, *path)
-        return file.place(path)
+        name, *rest = spot.path
+        if name == "rules" and rest:
+            return file.place((*model.rule_path(int(rest[0]) + 1), *rest[1:]))
+        return file.place(spot.path)
 
     def _report_name(self, text: str, old: _Spot, new: _Spot | None = None) -> None:
         self._report("name", text, "never", old, new or old, is_harmless=True)

@@ -24,7 +24,6 @@ from fuzzytree.model import (
     Document,
     FloatArray,
     Formula,
-    FuzzyTree,
     Linear,
     Variable,
     name_choice,
@@ -118,7 +117,7 @@ def _curves(model: Document) -> dict[str, list[Curve]]:
     curves: dict[str, list[Curve]] = {}
     for variable in model.variables:
         curves[variable.name] = [term.function for term in variable.terms]
-    for fitted in model.sets if isinstance(model, FuzzyTree) else ():
+    for fitted in model.sets:
         curves[fitted.variable] += [term.function for term in fitted.terms]
     return curves
 

@@ -13,8 +13,6 @@ from fuzzytree.checking import format_of
 from fuzzytree.errors import ReadError
 from fuzzytree.model import (
     Document,
-    FuzzySystem,
-    FuzzyTree,
     Locate,
     Path,
     Rule,
@@ -60,29 +58,12 @@ def model_file(name: str, content: bytes) -> ModelFile:
     return ModelFile(name, content, lambda path: locate()(path))
 
 
-def rule_path(model: Document, number: int) -> Path:
-    """Return where a model has a rule; a tree's rules are its leaves."""
-    match model:
-        case RuleBase():
-            return ("rules", number - 1)
-        case FuzzyTree():
-            return ("leaves", number - 1)
-        case FuzzySystem():
-            for position, block in enumerate(model.blocks):
-                if number <= len(block.rules):
-                    return ("blocks", position, "rules", number - 1)
-                number -= len(block.rules)
-            return ("blocks",)
-
-
 def term_path(model: Document, label: TermName) -> Path:
     """Return where a model has a term; where its variables are if it has none."""
     owners = [("variables", k, v.name, v.terms) for k, v in enumerate(model.variables)]
-    if isinstance(model, FuzzySystem):
-        outputs = enumerate(model.outputs)
-        owners += [("outputs", k, o.name, o.terms) for k, o in outputs]
-    if isinstance(model, FuzzyTree):
-        owners += [("sets", k, s.variable, s.terms) for k, s in enumerate(model.sets)]
+    outputs = enumerate(model.outputs)
+    owners += [("outputs", k, o.name, o.terms) for k, o in outputs]
+    owners += [("sets", k, s.variable, s.terms) for k, s in enumerate(model.sets)]
     for kind, k, name, terms in owners:
         names = [term.name for term in terms]
         if name == label.variable and label.term in names:
@@ -96,7 +77,7 @@ def locations_of(
     """Return where the rules and terms of an answer stand, in that order."""
     if file is None:
         return ()
-    paths = [rule_path(model, number) for number in numbers]
+    paths = [model.rule_path(number) for number in numbers]
     paths += [term_path(model, label) for label in answer.terms]
     places = (file.place(path) for path in paths)
     return tuple(dict.fromkeys(place for place in places if place is not None))

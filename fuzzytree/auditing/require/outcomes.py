@@ -87,7 +87,6 @@ def class_outcome(search: Search, labels: Sequence[str | None]) -> Outcome:
     that stands behind it, and stronger than those before it.
     """
     model, rules = search.model, search.base.rules
-    assert not isinstance(model, FuzzySystem)
     right = [k for k, rule in enumerate(rules) if rule.then in labels]
     questions = [
         Question(
@@ -96,7 +95,7 @@ def class_outcome(search: Search, labels: Sequence[str | None]) -> Outcome:
         for k, rule in enumerate(rules)
         if rule.then not in labels
     ]
-    if not isinstance(model, FuzzyTree) and model.semantics.uncovered not in labels:
+    if model.rules and search.base.uncovered not in labels:
         questions.append(gap(range(len(rules))))
     allowed = [k for k, label in enumerate((*model.classes, None)) if label in labels]
 
@@ -119,7 +118,6 @@ def gap(rules: Sequence[int]) -> Question:
 def order_outcome(search: Search, claim: OrderClaim) -> Outcome:
     """Return whether no class follows a later one as an input rises."""
     model, labels = search.model, claim.labels
-    assert not isinstance(model, FuzzySystem)
     ranks = np.array([*map(labels.index, model.classes), np.nan])
 
     def loss(rows: Rows) -> FloatArray:
@@ -129,9 +127,10 @@ def order_outcome(search: Search, claim: OrderClaim) -> Outcome:
     rows = search.worst(loss, [claim.input])
     if rows is not None:
         return Outcome("REFUTED", "an earlier class follows", rows)
-    if isinstance(model, FuzzyTree):
+    if tree := search.tree:
         return _of_leaves(
             search,
+            tree,
             [claim.input],
             lambda first, second: labels.index(first) > labels.index(second),
             rises=True,
@@ -142,10 +141,8 @@ def order_outcome(search: Search, claim: OrderClaim) -> Outcome:
 def constancy_outcome(search: Search, columns: tuple[str, ...]) -> Outcome:
     """Return whether no prediction depends on some inputs."""
     model, rules, axes = search.model, search.base.rules, search.base.axes
-    scales = [0.5]  # of the position of a class
-    if isinstance(model, FuzzySystem):
-        scales = [scale_of(model, output.name) for output in model.outputs]
-    allowed = ROUNDING * np.array(scales)
+    scales = [scale_of(model, output.name) for output in model.outputs]
+    allowed = ROUNDING * np.array(scales or [0.5])  # or of the position of a class
 
     def loss(rows: Rows) -> FloatArray:
         first, second = np.moveaxis(search.predict(rows), 1, 0)
@@ -156,16 +153,14 @@ def constancy_outcome(search: Search, columns: tuple[str, ...]) -> Outcome:
     pair = search.worst(loss, columns) if columns else None
     if pair is not None:
         return Outcome("REFUTED", "the rows differ in nothing else", pair)
-    if isinstance(model, FuzzyTree):
-        return _of_leaves(search, columns, str.__ne__, rises=False)
-    rest: set[int] = {*range(len(rules))}
-    if isinstance(model, FuzzySystem):
-        rest.clear()
-        places = [model.inputs.index(name) for name in columns]
-        for term in (term for output in model.outputs for term in output.terms):
-            weights = isinstance(term.function, Linear) and term.function.weights
-            if weights and any(weights[place] for place in places):
-                return Outcome("OPEN", f"the term {term.name!r} adds it")
+    if tree := search.tree:
+        return _of_leaves(search, tree, columns, str.__ne__, rises=False)
+    rest: set[int] = set() if model.outputs else {*range(len(rules))}
+    places = [model.inputs.index(name) for name in columns]
+    for term in (term for output in model.outputs for term in output.terms):
+        weights = isinstance(term.function, Linear) and term.function.weights
+        if weights and any(weights[place] for place in places):
+            return Outcome("OPEN", f"the term {term.name!r} adds it")
     if search.base.left_out:
         return Outcome("OPEN", f"{search.base.left_out[0].name} is not bounded")
     tests = [
@@ -185,15 +180,18 @@ _IsWrong = Callable[[str, str], bool]  # of the classes of two rows
 
 
 def _of_leaves(
-    search: Search, changes: Collection[str], is_wrong: _IsWrong, *, rises: bool
+    search: Search,
+    tree: FuzzyTree,
+    changes: Collection[str],
+    is_wrong: _IsWrong,
+    *,
+    rises: bool,
 ) -> Outcome:
     """Return whether the classes of no two leaves of a tree are wrong together.
 
     A leaf is a product of unions of intervals, so two rows with the same values of all
     other inputs can reach two leaves exactly if these share a value of each.
     """
-    tree = search.model
-    assert isinstance(tree, FuzzyTree)
     tests = {node.variable for node in tree.nodes}
     for variable in tree.variables:
         sums = {part.input for part in variable.parts} & {*changes}

@@ -34,7 +34,7 @@ from fuzzytree.auditing.require.claims import (
 from fuzzytree.cells import number_of
 from fuzzytree.files import PathLike, read_bounded
 from fuzzytree.formats import FileRecord, bind, compose, find, report
-from fuzzytree.model import Document, FuzzySystem, Variable, name_choice
+from fuzzytree.model import Document, Variable, name_choice
 
 _MOST_BOXES = 256
 _MOST_BYTES = 2**20
@@ -205,18 +205,18 @@ def _input(text: str, model: Document) -> Variable:
 
 
 def _claim(text: str, model: Document) -> Claim:
-    forms = _OF_OUTPUTS if isinstance(model, FuzzySystem) else _OF_CLASSES
+    forms = _OF_OUTPUTS if model.outputs else _OF_CLASSES
     matches = (re.fullmatch(pattern, text) for pattern in forms)
     match = next((match for match in matches if match), None)
     if match is None:
         shown = "; ".join(forms.values())
         raise ValueError(f"{text!r} is no requirement of this model; there is {shown}")
     if columns := match.groupdict().get("columns"):  # some are no inputs
-        every = sorted({*model.inputs, *getattr(model, "columns", ())})
+        every = sorted({*model.inputs, *model.columns})
         names = _names(columns, r",|\bor\b|\band\b")
         chosen = [_choice(name, "column", every) for name in names]
         return ConstancyClaim(tuple(name for name in chosen if name in model.inputs))
-    if isinstance(model, FuzzySystem):
+    if model.outputs:
         return _output_claim(match, model)
     return _class_claim(match, model.classes, model)
 
@@ -238,7 +238,7 @@ def _class_claim(
     return ClassClaim(labels)
 
 
-def _output_claim(match: re.Match[str], system: FuzzySystem) -> Claim:
+def _output_claim(match: re.Match[str], system: Document) -> Claim:
     words = match.groupdict()
     if not words:
         return CoverageClaim()

@@ -59,6 +59,7 @@ class Search:
 
     def __init__(self, model: Document, domain: Domain, steps: int) -> None:
         self.model, self.domain, self.steps = model, domain, steps
+        self.tree = model if isinstance(model, FuzzyTree) else None
         self.base = Base.of(model, domain)
         self.run = predictor(model)
         self._decider = Decider(self.base)
@@ -175,16 +176,11 @@ def predictor(model: Document) -> Callable[[FloatArray], FloatArray]:
     Of a system the results are its outputs; of a classifier the one result is the
     position of the class, behind all of them for none.
     """
+    run = baseline().load(model, with_strengths=False)
     if isinstance(model, FuzzySystem):
-        numbers = baseline().load(model, with_strengths=False)
-        return lambda rows: cast("FloatArray", numbers(rows).outputs)
-    run = baseline().load(model)
-    labels = [model.semantics.uncovered]
-    if isinstance(model, FuzzyTree):
-        labels += [leaf.label for leaf in model.leaves]
-    else:
-        labels += [rule.then for rule in model.rules]
+        return lambda rows: cast("FloatArray", run(rows).outputs)
     places = [*model.classes, None]
+    labels = [model.semantics.uncovered, *model.rule_labels]
     codes = np.array([float(places.index(label)) for label in labels])
     return lambda rows: codes[run(rows).rule][None]
 
@@ -195,7 +191,7 @@ def predictor(model: Document) -> Callable[[FloatArray], FloatArray]:
 def prediction_texts(model: Document, rows: Rows) -> tuple[str, ...]:
     """Return the predictions of the rows of a try in words."""
     results = predictor(model)(rows[..., 0]).T.tolist()
-    if not isinstance(model, FuzzySystem):
+    if not model.outputs:
         labels = (*model.classes, "no class")
         return tuple(labels[int(code)] for (code,) in results)
     return tuple(

@@ -13,7 +13,6 @@ from fuzzytree.auditing.findings.locations import (
     ModelFile,
     locations_of,
     model_file,
-    rule_path,
     term_path,
     with_ids,
 )
@@ -50,7 +49,7 @@ def test_each_rule_and_term_of_a_rule_base_is_found(seed: int) -> None:
     rules = ft.rules_from_tree(random_tree(seed))
     file = written(rules)
     for number in range(1, len(rules.rules) + 1):
-        found = text_at(file, file.place(rule_path(rules, number)))
+        found = text_at(file, file.place(rules.rule_path(number)))
         assert found.lstrip("{").startswith("if:")
     check_terms(rules, file)
 
@@ -60,7 +59,7 @@ def test_each_leaf_and_term_of_a_tree_is_found(seed: int) -> None:
     tree = random_tree(seed)
     file = written(tree)
     for number in range(1, len(tree.leaves) + 1):
-        found = text_at(file, file.place(rule_path(tree, number)))
+        found = text_at(file, file.place(tree.rule_path(number)))
         assert found.lstrip("{").startswith(f"leaf: {number}")
     check_terms(tree, file)
     for group in tree.sets:
@@ -85,7 +84,7 @@ def test_each_rule_of_a_system_is_found_over_all_blocks(seed: int) -> None:
     file = written(system)
     lines = set[int]()
     for number in range(1, len(system.rules) + 1):
-        place = file.place(rule_path(system, number))
+        place = file.place(system.rule_path(number))
         assert place is not None
         lines.add(place.line)
         assert text_at(file, place).lstrip("{").startswith(("name:", "if:"))
@@ -106,7 +105,7 @@ def test_a_rule_of_another_format_has_its_place() -> None:
     rules = ft.rules_from_tree(random_tree(1))
     file = model_file("rules.fll", ft.export(rules, "fll", allow_loss=True).content)
     for number in range(1, len(rules.rules) + 1):
-        assert text_at(file, file.place(rule_path(rules, number))).startswith("if ")
+        assert text_at(file, file.place(rules.rule_path(number))).startswith("if ")
 
 
 def test_a_file_that_is_written_for_others_has_no_places() -> None:
