@@ -309,8 +309,7 @@ def rated(model: Rated, seed: int) -> Rated:
     """
     chance = random.Random(seed)
     vectors: list[tuple[float, ...]] = []
-    ends = model.leaves if isinstance(model, FuzzyTree) else model.rules
-    for _ in ends:
+    for _ in model.rule_labels:
         count = len(model.classes) - 1
         marks: list[int] = sorted(chance.choices(range(PARTS + 1), k=count))
         steps = itertools.pairwise([0, *marks, PARTS])

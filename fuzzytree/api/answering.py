@@ -24,7 +24,6 @@ from fuzzytree.model import (
     FuzzyTree,
     Model,
     ModelSource,
-    RuleBase,
     Runtime,
     Variable,
     kind_of,
@@ -51,6 +50,7 @@ Carried = ModelSource | OnnxModel | bytes
 """A model, an ONNX file opened or as bytes, or the path of a file of either."""
 
 _BLOCK = 1 << 16  # rows answered at a time
+_SHORT = "best-first"  # gives the same classes, rules and statuses, no strengths
 
 
 def opened(source: Carried, *, allow_loss: bool = False) -> Document | OnnxModel:
@@ -231,8 +231,8 @@ def prepare_answering(
     if isinstance(model, OnnxModel):
         return _answering_onnx(model, runtime, with_strengths=with_strengths)
     is_short = not (with_strengths or with_probabilities)
-    if runtime is None and isinstance(model, RuleBase) and is_short:
-        runtime = "best-first"  # gives the same classes, rules and statuses
+    if is_short and runtime is None and kind_of(model) in find_runtime(_SHORT).runs:
+        runtime = _SHORT
     used = _runtime(runtime or baseline().name, model)
     execute = used.load(model, with_strengths=with_strengths or with_probabilities)
 
@@ -271,7 +271,7 @@ def _answering_onnx(
             "other runtimes need the YAML file"
         )
     run = model.run_labelled
-    if run is None and model.representation != "system":
+    if run is None and not model.names:
         raise ReadError(f"{model.name}: the ONNX file has no output 'label'")
     position: dict[str | None, int] = {name: k for k, name in enumerate(model.classes)}
 

@@ -74,7 +74,7 @@ def _variable_losses(variable: Variable, model: Model) -> Iterator[Loss]:
             where, [("weight", part.weight), ("centre", part.centre)]
         )
         yield from _zero_losses(where, "weight", part.weight)
-    if isinstance(model, FuzzyTree):
+    if not model.rules:
         return  # descent needs no term
     for term in variable.terms:
         yield from _shape_losses(f"term {term.name!r} of {variable.name!r}", term.shape)

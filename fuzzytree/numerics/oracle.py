@@ -138,13 +138,10 @@ def decide(
 def _chunks(model: Model, rows: int) -> Iterator[slice]:
     """Yield parts of the rows, at least one, that need a bounded memory each."""
     size = len(model.variables) + 1
-    if isinstance(model, RuleBase):
-        propositions = {
-            proposition for rule in model.rules for proposition in rule.when
-        }
-        size += len(model.rules) + sum(
-            len(proposition.terms) + 1 for proposition in propositions
-        )
+    propositions = {proposition for rule in model.rules for proposition in rule.when}
+    size += len(model.rules) + sum(
+        len(proposition.terms) + 1 for proposition in propositions
+    )
     step = min(max(_NUMBERS // size, _FEWEST), _MOST)
     for start in range(0, max(rows, 1), step):
         yield slice(start, start + step)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from fuzzytree.model import FloatArray, Model, Outcome, RuleBase, Run
+from fuzzytree.model import FloatArray, Model, Outcome, Run
 from fuzzytree.runtimes import native, reference
 from fuzzytree.semantics import INEXACT, LOGICAL, NUMERIC, Program, still_results
 
@@ -79,7 +79,7 @@ def load(model: Model) -> Run:
         (7, 1)
     """
     many = native.load(model)
-    if not isinstance(model, RuleBase) or len(model.rules) > _FEW_RULES:
+    if not 0 < len(model.rules) <= _FEW_RULES:
         return many
     one = reference.load(model)
 

@@ -23,7 +23,6 @@ from fuzzytree.model import (
     Dtype,
     FloatArray,
     FuzzySystem,
-    FuzzyTree,
     Model,
     ModelKind,
     Outcome,
@@ -195,14 +194,14 @@ def prepare(
         LossError: If the number type or the kind of graph cannot hold the model.
         MissingExtraError: If onnx or onnxruntime is not installed.
     """
-    if readable and isinstance(model, FuzzyTree):
+    if readable and not model.rules:
         raise LossError("onnxruntime readable runs rules, and this is a tree")
-    if plain and not isinstance(model, FuzzyTree):
+    if plain and model.rules:
         raise LossError("onnxruntime plain runs trees, and these are rules")
     _require_packages("running")
 
     outputs: tuple[Output, ...] = ("rule", "status", "strengths")
-    if isinstance(model, FuzzyTree):
+    if not model.rules:
         outputs = outputs[:2]
     elif probabilities and model.semantics.sharpness:
         outputs = (*outputs, "probabilities")
@@ -354,7 +353,7 @@ def _rows_at_once(facts: Facts) -> int:
     """Return how many rows are answered together, so that they stay in the cache."""
     if facts.representation == "tree":
         return max(2**12, min(2**16, 2**22 // facts.rules))
-    if facts.representation == "system":
+    if facts.names:
         return min(max(facts.chunk, 1), 2**16)
     degree = 8 if facts.dtype == "float64" else 4
     return max(128, min(2**13, _CACHE_BYTES // (degree * facts.rules)))
@@ -497,9 +496,9 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
         facts = msgspec.convert(known, Facts)
     except (json.JSONDecodeError, msgspec.ValidationError) as error:
         raise ReadError(f"{name}: the file's metadata is broken: {error}") from error
-    least = 0 if facts.representation == "system" else 1
-    is_possible = least <= facts.rules <= proto.ByteSize()
-    is_possible &= (facts.representation == "system") == bool(facts.names)
+    is_system = facts.representation == "system"
+    is_possible = (0 if is_system else 1) <= facts.rules <= proto.ByteSize()
+    is_possible &= is_system == bool(facts.names)
     if not set(facts.inputs) <= set(facts.columns) or not is_possible:
         raise ReadError(f"{name}: the file's metadata contradicts itself")
     names = (*facts.columns, *facts.units, *facts.classes, *facts.names)
@@ -544,7 +543,7 @@ def _check_signature(proto: onnx.ModelProto, facts: Facts, name: str) -> None:
             f"{name}: the graph's inputs and outputs are not those of its metadata"
         )
     needed, wanted = "rule", "label and rule"
-    if facts.representation == "system":
+    if facts.names:
         needed, wanted = "outputs", "outputs and status"
     if needed not in outputs:
         raise ReadError(

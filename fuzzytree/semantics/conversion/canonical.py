@@ -78,15 +78,12 @@ def canonical_form(model: Document) -> Document:
         True
     """
     terms = {one.name: one.terms for one in model.variables}
-    if isinstance(model, FuzzySystem):
-        terms |= {one.name: one.terms for one in model.outputs}
-    sets = model.sets if isinstance(model, FuzzyTree) else ()
-    classes = () if isinstance(model, FuzzySystem) else model.classes
+    terms |= {output.name: output.terms for output in model.outputs}
     names = _NewNames(
         _numbered("v", terms),
         {name: _numbered("t", (t.name for t in own)) for name, own in terms.items()},
-        {s.variable: _numbered("t", (t.name for t in s.terms)) for s in sets},
-        {None: None} | {name: f"c{k}" for k, name in enumerate(classes, 1)},
+        {s.variable: _numbered("t", (t.name for t in s.terms)) for s in model.sets},
+        {None: None} | {name: f"c{k}" for k, name in enumerate(model.classes, 1)},
     )
     form: Document = _renamed(model, names)
     return form

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from fuzzytree.exporters import check_outputs, check_versions, facts_of, require
-from fuzzytree.model import FuzzyTree, Model, RuleBase, Written, kind_of
+from fuzzytree.model import FuzzyTree, Model, Written, kind_of
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.plain import State, check_reject
 from fuzzytree.tactile.sensor import Sensor, offsets
@@ -72,7 +72,7 @@ def write_frames(
         ()
     """
     check_outputs(model, outputs, get_args(Output))
-    if plain and not isinstance(model, FuzzyTree):
+    if plain and model.rules:
         raise ValueError("plain is for trees: rules never need ai.onnx.ml")
     check_versions(opset, ir)
     check_reject(model, reject)
@@ -84,7 +84,7 @@ def write_frames(
     made, sheet = frame_program(sensor, model.inputs), OnnxGraph(opset)
     _fill(sheet, made, model, outputs, reject, plain=plain)
     sheet.tensors = sheet.used()
-    rules = len(model.rules) if isinstance(model, RuleBase) else 0
+    rules = len(model.rules)
     kinds: dict[Output, tuple[int, list[str | int]]] = {
         "label": (TensorProto.STRING, ["frames"]),
         "state": (TensorProto.INT64, ["frames"]),
@@ -129,7 +129,7 @@ def _facts(
 
 
 def _in_words(sensor: Sensor, model: Model) -> str:
-    what = "tree" if isinstance(model, FuzzyTree) else "rule base"
+    what = "rule base" if model.rules else "tree"
     return (
         f"Frames of {sensor.rows} x {sensor.columns} cells, row 0 at the top, to the "
         f"classes of the fuzzy {what} {model.name!r}: a cell counts where it reads "
@@ -184,7 +184,7 @@ def _fill(
         is_strong = _is_strong(sheet, strengths, reject)
         known = sheet.node("And", known, is_strong, hint="is_known")
     _ends(sheet, model, is_pressed, known, outputs)
-    if "strengths" in outputs and isinstance(model, RuleBase):
+    if "strengths" in outputs and model.rules:
         finite = is_known(sheet, axes, is_flat=True)
         finite = sheet.node("And", is_pressed, finite, hint="is_finite")
         add_strengths(sheet, len(model.rules), strengths, finite, 0.0)
@@ -250,7 +250,7 @@ def _is_answer(sheet: OnnxGraph, model: Model, axes: InputBlock) -> str:
     """Return whether the model knows an answer to the features."""
     from fuzzytree.exporters import is_known
 
-    if isinstance(model, RuleBase) and model.semantics.uncovered is not None:
+    if model.rules and model.semantics.uncovered is not None:
         return is_known(sheet, axes, is_flat=True)
     return sheet.node("Less", sheet.whole(0), "winner", hint="is_answer")
 
@@ -284,12 +284,7 @@ def _ends(
     if "rule" in outputs:
         sheet.node("Where", known, "winner", sheet.whole(0), named="rule")
     if "label" in outputs:
-        labels = (
-            [leaf.label for leaf in model.leaves]
-            if isinstance(model, FuzzyTree)
-            else [rule.then for rule in model.rules]
-        )
-        texts = [model.semantics.uncovered or "", *labels, ""]
+        texts = [model.semantics.uncovered or "", *model.rule_labels, ""]
         nothing = sheet.whole(len(texts) - 1)
         place = sheet.node("Where", known, "winner", nothing, hint="label_number")
         table = sheet.texts(texts, "labels")

@@ -113,7 +113,7 @@ def plain_answer(
     """
     given = tuple(values)
     if not is_pressed:
-        fired = (0.0,) * len(model.rules) if isinstance(model, RuleBase) else ()
+        fired = (0.0,) * len(model.rules)
         return Shown(given, State.NOTHING, -1, 0, fired)
     answer = answer_of(model, dict(zip(model.inputs, given, strict=True)))
     is_weak = reject and answer.rule and answer.strengths[answer.rule - 1] < reject

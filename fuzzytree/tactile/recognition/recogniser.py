@@ -103,11 +103,8 @@ class Recogniser:
         self._decide: Run = load(model)
         self._fire: Run | None = load(rules) if rules is not model else None
         code = {label: place for place, label in enumerate(model.classes)}
-        if isinstance(model, FuzzyTree):
-            ends = [leaf.label for leaf in model.leaves]
-        else:
-            ends = [rule.then for rule in model.rules]
-        self._class_of = np.array([code[label] for label in ends], np.int64)
+        codes = [code[label] for label in model.rule_labels]
+        self._class_of = np.array(codes, np.int64)
         other = model.semantics.uncovered
         self._uncovered = -1 if other is None else code[other]
         self._rated: RuleBase | None = None  # what mixes the model's probabilities
