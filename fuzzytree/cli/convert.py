@@ -189,19 +189,20 @@ def carry(
         write_atomically(chosen.output, written.content)
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
-    is_raw = isinstance(model, RuleBase) and model.kind == "raw"
+    rules = model if isinstance(model, RuleBase) else None
+    is_raw = rules is not None and rules.kind == "raw"
     more = ("--terms", "raw") if is_raw and model is not found.model else ()
-    if isinstance(model, RuleBase) and form.read and "tolerance" in options:
+    if rules and form.read and "tolerance" in options:
         more = (*more, "--tolerance", str(options["tolerance"]))
     after = next_check((source, read_as), (chosen.output, form.name), more=more)
     if after and found.losses:
         after += " --allow-loss"
-    if kind_of(model) == "system" != kind_of(found.model):
+    if model.outputs and not found.model.outputs:
         after = ""  # numbers are not compared with classes
     label, shows = "next", ""
     if written.losses:
         shows = " (shows what the losses change)"
-        if proof.verdict == "as listed" and kind_of(model) == "system":
+        if proof.verdict == "as listed" and model.outputs:
             label, shows = "differs", " (exits 1, and shows what the losses change)"
     lost = [f"lost     {loss_text(one)}" for one in (*found.losses, *written.losses)]
     coverage = proof.coverage.sentences if proof.coverage else ()

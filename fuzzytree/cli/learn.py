@@ -42,7 +42,7 @@ from fuzzytree.cli.representation import (
 )
 from fuzzytree.errors import TableError
 from fuzzytree.files import check_place, read_bounded, write_atomically
-from fuzzytree.model import Document, Format, depth, kind_of, printable
+from fuzzytree.model import Document, Format, depth, printable
 
 if TYPE_CHECKING:
     from fuzzytree.api import Accuracy, LeafCounts, Summary
@@ -400,7 +400,7 @@ def _write(
         answer_bytes(content)
         return
     write_atomically(options.output, content)
-    if kind_of(model) == "system":  # it takes the positions of categories
+    if model.outputs:  # a system takes the positions of categories
         is_data = is_data and not any(one.categories for one in tree.variables)
     rest = ["--data", options.tables[0]] if is_data else []
     rest += table_format(options).words() if rest else []

@@ -119,14 +119,12 @@ def command(options: RunOptions) -> None:
     reason = _reasons(options.model, found) if options.why else None
     if options.strengths and isinstance(found, FuzzyTree):
         found = rules_from_tree(found)
-    if options.strengths == "class" and isinstance(found, FuzzySystem):
+    if options.strengths == "class" and not found.classes:
         raise click.UsageError(
             f"--strengths class: {found.name} is a fuzzy system, which decides for no "
             "class; there is --strengths rule"
         )
-    is_weighed = options.strengths is not None or (
-        options.why and isinstance(found, FuzzySystem)
-    )
+    is_weighed = options.strengths is not None or (options.why and not found.classes)
     with wrong_options():
         answer = api.prepare_answering(
             found,

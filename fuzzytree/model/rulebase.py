@@ -170,6 +170,11 @@ class RuleBase(Value, frozen=True):
         return ()
 
     @property
+    def blocks(self) -> tuple[()]:
+        """The blocks of a system's rules: none, its rules stand alone."""
+        return ()
+
+    @property
     def sets(self) -> tuple[()]:
         """The fitted sets that it keeps beside its terms: none."""
         return ()

@@ -16,10 +16,10 @@ import numpy.typing as npt
 from fuzzytree.model import (
     LR,
     Band,
+    Document,
     Dtype,
     FuzzyTree,
     Loss,
-    Model,
     Points,
     Shape,
     Variable,
@@ -51,7 +51,7 @@ def rounded(
     return single
 
 
-def losses(model: Model, dtype: Dtype) -> tuple[Loss, ...]:
+def losses(model: Document, dtype: Dtype) -> tuple[Loss, ...]:
     """Return what a type cannot hold of a model; nothing for double.
 
     In mixed, only curves, reaches and degrees are float32; a valid model's fit in.
@@ -67,7 +67,7 @@ def losses(model: Model, dtype: Dtype) -> tuple[Loss, ...]:
     return tuple(found)
 
 
-def _variable_losses(variable: Variable, model: Model) -> Iterator[Loss]:
+def _variable_losses(variable: Variable, model: Document) -> Iterator[Loss]:
     for part in variable.parts:
         where = f"part {part.input!r} of {variable.name!r}"
         yield from _number_losses(

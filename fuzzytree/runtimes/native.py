@@ -9,6 +9,7 @@ from fuzzytree.model import (
     Document,
     Dtype,
     FuzzySystem,
+    FuzzyTree,
     Model,
     RuleBase,
     Run,
@@ -33,16 +34,18 @@ def load(
     Raises:
         LossError: If the type cannot hold the model.
     """
-    if isinstance(model, FuzzySystem):
-        return run_system(model, with_strengths=with_strengths)
     lost = losses(model, dtype)
     if lost:
         result = "; ".join(f"{loss.where}: {loss.what}" for loss in lost[:3])
         more = f"; and {len(lost) - 3} more" if len(lost) > 3 else ""
         raise LossError(f"cannot run {model.name} in {dtype}: {result}{more}")
-    if isinstance(model, RuleBase):
-        return fire(model, dtype)
-    return follow(model, dtype)
+    match model:
+        case FuzzyTree():
+            return follow(model, dtype)
+        case RuleBase():
+            return fire(model, dtype)
+        case FuzzySystem():
+            return run_system(model, with_strengths=with_strengths)
 
 
 def load_best_first(model: Model, *, with_strengths: bool = False) -> Run:

@@ -8,6 +8,7 @@ from fuzzytree.model import (
     Document,
     FloatArray,
     FuzzySystem,
+    FuzzyTree,
     Outcome,
     RuleBase,
     Run,
@@ -23,17 +24,18 @@ def load(model: Document, *, with_strengths: bool = True) -> Run:
     def run(values: FloatArray) -> Outcome:
         table = checked(values, model.inputs).T.tolist()
         rows = [dict(zip(model.inputs, row, strict=True)) for row in table]
-        if isinstance(model, FuzzySystem):
-            inferred = [infer(model, row) for row in rows]
-            lines = [(*r.outputs, *r.activations, r.status) for r in inferred]
-            width = len(model.outputs) + len(model.rules) + 1
-            numbers = np.array(lines, np.float64).reshape(len(rows), width).T
-            return system_outcome(model, numbers)
         answers: list[Answer]
-        if isinstance(model, RuleBase):
-            answers = [evaluate(model, row) for row in rows]
-        else:
-            answers = [descend(model, row) for row in rows]
+        match model:
+            case FuzzySystem():
+                inferred = [infer(model, row) for row in rows]
+                lines = [(*r.outputs, *r.activations, r.status) for r in inferred]
+                width = len(model.outputs) + len(model.rules) + 1
+                numbers = np.array(lines, np.float64).reshape(len(rows), width).T
+                return system_outcome(model, numbers)
+            case RuleBase():
+                answers = [evaluate(model, row) for row in rows]
+            case FuzzyTree():
+                answers = [descend(model, row) for row in rows]
         return outcome_of(model, [[a.rule, a.status, *a.strengths] for a in answers])
 
     return run

@@ -109,11 +109,9 @@ class Keys:
         curves: Curves | None = None,
     ) -> None:
         self.inputs, self.domain, self.curves = model.inputs, domain, curves
-        self.system = model if isinstance(model, FuzzySystem) else None
-        outputs = self.system.outputs if self.system else ()
-        self.blocks = self.system.blocks if self.system else ()
-        self.outputs = {output.name: output for output in outputs}
-        variables: list[Variable | SystemOutput] = [*model.variables, *outputs]
+        self.blocks: tuple[RuleBlock, ...] = model.blocks
+        self.outputs = {output.name: output for output in model.outputs}
+        variables: list[Variable | SystemOutput] = [*model.variables, *model.outputs]
         self.terms = {(v.name, term.name): term for v in variables for term in v.terms}
         self.sources: dict[str, Hashable] = {}
         for variable in model.variables:
@@ -124,7 +122,7 @@ class Keys:
         rules = [rule for block in self.blocks for rule in block.rules]
         names |= {part.variable for rule in rules for part in questions(rule.when)}
         self.is_chained = not names.isdisjoint(self.outputs)
-        self.joined = joined_outputs(self.system) if self.system else frozenset()
+        self.joined = joined_outputs(model)
 
     def _source(self, variable: Variable) -> Hashable:
         """Return what the value of a variable is computed from."""

@@ -33,12 +33,12 @@ from fuzzytree.auditing.findings.records import FileLocation, Measure
 from fuzzytree.model import (
     Document,
     FuzzySystem,
-    FuzzyTree,
     Part,
     Path,
     RuleBase,
     Semantics,
     Variable,
+    kind_of,
 )
 from fuzzytree.numerics import outwards
 from fuzzytree.semantics import shape_of
@@ -143,41 +143,41 @@ class Structure:
     def _compare(
         self, old: RuleBase | FuzzySystem, new: RuleBase | FuzzySystem
     ) -> None:
-        names: dict[str, str] = {}
-        if isinstance(old, RuleBase) and isinstance(new, RuleBase):
-            names = self._compare_classes(old, new)
-            self._compare_semantics(old.semantics, new.semantics, names)
+        names = self._compare_classes(old, new)
         matching = self._compare_rules(old, new, names)
         self._compare_variables("variables", old.variables, new.variables)
-        if isinstance(old, FuzzySystem) and isinstance(new, FuzzySystem):
-            self._compare_variables("outputs", old.outputs, new.outputs)
-            self._compare_blocks(old, new)
-            if old.note != new.note:
-                self._report_name("the note has changed", _Spot(("note",)))
-        match self.models:
-            case FuzzyTree() as tree, FuzzyTree() as other:
-                self._compare_sets(tree, other)
-            case _:
+        self._compare_variables("outputs", old.outputs, new.outputs)
+        match old, new:
+            case RuleBase(), RuleBase():
+                self._compare_semantics(old.semantics, new.semantics, names)
+                self._compare_probabilities(old, new, matching)
+            case FuzzySystem(), FuzzySystem():
+                self._compare_blocks(old, new)
+                if old.note != new.note:
+                    self._report_name("the note has changed", _Spot(("note",)))
+            case _:  # a model of another kind was refused before
                 pass
+        if len({kind_of(model) for model in self.models}) == 1:
+            self._compare_sets(*self.models)
         if old.name != new.name:
             text = f"the model {old.name!r} is called {new.name!r}"
             self._report_name(text, _Spot(("name",)))
-        if isinstance(old, RuleBase) and isinstance(new, RuleBase):
-            text = "the columns of the training table are"
-            columns = names_text(old.columns), names_text(new.columns)
-            self._report_fact("columns", text, *columns, "never", "columns")
-            if old.inputs != new.inputs and sorted(old.inputs) == sorted(new.inputs):
-                text = f"the inputs stand in another order: {names_text(new.inputs)}"
-                here = _Spot(("variables",))
-                self._report("input", text, "never", here, here)
-            self._compare_probabilities(old, new, matching)
+        text = "the columns of the training table are"
+        columns = names_text(old.columns), names_text(new.columns)
+        self._report_fact("columns", text, *columns, "never", "columns")
+        if old.inputs != new.inputs and sorted(old.inputs) == sorted(new.inputs):
+            text = f"the inputs stand in another order: {names_text(new.inputs)}"
+            here = _Spot(("variables",))
+            self._report("input", text, "never", here, here)
 
     # --- class rules
 
-    def _compare_classes(self, old: RuleBase, new: RuleBase) -> dict[str, str]:
+    def _compare_classes(
+        self, old: RuleBase | FuzzySystem, new: RuleBase | FuzzySystem
+    ) -> dict[str, str]:
         """Return new names of classes: those with equal antecedents are the same."""
 
-        def labels(model: RuleBase) -> list[tuple[str, Hashable]]:
+        def labels(model: RuleBase | FuzzySystem) -> list[tuple[str, Hashable]]:
             rules = rules_to_match(model, self.curves)
             return [
                 (label, frozenset(r.antecedent for r in rules if r.then == label))
@@ -251,7 +251,7 @@ class Structure:
                     "support", text, "never", mine, theirs, is_harmless=is_support
                 )
 
-    def _compare_sets(self, old: FuzzyTree, new: FuzzyTree) -> None:
+    def _compare_sets(self, old: Document, new: Document) -> None:
         """Report which fitted sets of trees differ: only raw rules use them."""
         mine, theirs = (
             {

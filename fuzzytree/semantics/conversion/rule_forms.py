@@ -25,14 +25,16 @@ from fuzzytree.model import (
     Not,
     Or,
     Proposition,
+    RuleBase,
     RuleBlock,
+    SystemOutput,
     SystemRule,
     combined,
     questions,
 )
 
 
-def joined_outputs(system: FuzzySystem) -> frozenset[str]:
+def joined_outputs(model: FuzzySystem | RuleBase) -> frozenset[str]:
     """Return the weighted outputs with an aggregation that can change an answer.
 
     It joins the degrees of each term: where every term is concluded once at most, and
@@ -45,15 +47,17 @@ def joined_outputs(system: FuzzySystem) -> frozenset[str]:
         >>> joined_outputs(as_system(rules_from_tree(random_tree(0))))
         frozenset()
     """
-    counts = Counter((one.output, one.term) for r in system.rules for one in r.then)
+    rules: list[SystemRule] = [rule for block in model.blocks for rule in block.rules]
+    counts = Counter((part.output, part.term) for rule in rules for part in rule.then)
     several = {output for (output, _), count in counts.items() if count > 1}
-    several |= {
-        proposition.variable for r in system.rules for proposition in questions(r.when)
-    }
+    several |= {part.variable for rule in rules for part in questions(rule.when)}
+    outputs: tuple[SystemOutput, ...] = model.outputs
     return frozenset(
-        one.name
-        for one in system.outputs
-        if one.defuzzifier.is_weighted and one.aggregation and one.name in several
+        output.name
+        for output in outputs
+        if output.defuzzifier.is_weighted
+        and output.aggregation
+        and output.name in several
     )
 
 
