@@ -1,9 +1,10 @@
-"""Python: a tree or rule base as one file that needs nothing but Python.
+"""Python: a model as one file that needs nothing but Python.
 
-A rule base is written as its program, step by step; a tree as a table of its nodes,
-which a loop descends, so that it may be of any depth. Predictions have the reference's
-bits. Text of the model enters only through `repr`, in tables and in comments, where
-nothing can be mistaken for code.
+A rule base or fuzzy system is written as its program, step by step; a tree as a table
+of its nodes, which a loop descends, so that it may be of any depth. Predictions have
+the reference's bits, and so have a system's numbers, for Python's own functions are
+those of the C library. Text of the model enters only through `repr`, in tables and in
+comments, where nothing can be mistaken for code.
 """
 
 from __future__ import annotations
@@ -19,26 +20,41 @@ from fuzzytree.exporters.program_text import (
     answer_of,
     node_rows,
     places_of,
+    system_examples,
     title_of,
 )
 from fuzzytree.model import (
+    Document,
     Format,
+    FuzzySystem,
     FuzzyTree,
-    Model,
     RuleBase,
     Variable,
     Written,
     fingerprint,
     sentence,
 )
-from fuzzytree.semantics import ResultKind, Step, from_axes, from_rules, probes
+from fuzzytree.semantics import (
+    OVER_SAMPLES,
+    Program,
+    ResultKind,
+    Step,
+    from_axes,
+    from_rules,
+    from_system,
+    probes,
+    system_probes,
+)
 
 _EXAMPLES = 6
-_FIRST: tuple[ResultKind, ...] = ("class", "rule", "status")
+_DECISION: tuple[ResultKind, ...] = ("class", "rule", "status", "strength")
+_INFERENCE: tuple[ResultKind, ...] = ("output", "status", "activation")
 
 _START = """\
 import math
 from bisect import bisect_left
+from functools import reduce
+from itertools import accumulate
 
 # Status of an answer.
 DECIDED, TIE, UNCOVERED, MISSING = 0, 1, 2, 3
@@ -63,6 +79,19 @@ def answer(values):
     return label, int(rule), int(status), strengths
 """
 
+_SYSTEM = """
+
+def answer(values):
+    \"\"\"Return outputs, status and activations for the inputs in order.\"\"\"
+    found, count = numbers(@values@), len(OUTPUTS)
+    return found[:count], int(found[count]), found[count + 1 :]
+
+
+def is_near(a, b, most):
+    \"\"\"Return whether numbers differ by no more than functions such as exp may.\"\"\"
+    return a == b or (a != a and b != b) or abs(a - b) <= most
+"""
+
 _NUMBER = """
 
 def number(value, names):
@@ -75,24 +104,26 @@ def number(value, names):
 _TEST = """
 
 if __name__ == "__main__":
-    for given, expected in EXAMPLES:
-        got = answer(given)[:3]
-        if got != expected:
+    for given, expected, *bounds in EXAMPLES:
+        got = @got@
+        if @wrong@:
             raise SystemExit(f"{given}: {got} instead of {expected}")
     print(f"{len(EXAMPLES)} examples answered as expected")
 """
 
 
-def write_python(model: Model, /, *, allow_loss: bool = False) -> Written:
+def write_python(model: Document, /, *, allow_loss: bool = False) -> Written:
     """Return a model as the text of a Python file, in UTF-8.
 
-    The file offers `decide(...)`, which takes each input by name and returns class
-    (or None), rule number (0 for none) and status; for a rule base also
-    `strengths(...)`; and `answer(values)` for the inputs in order. Run as a program it
-    tests itself. A category is its name, or its place among the categories.
+    Of a tree or rule base the file offers `decide(...)`, which takes each input by name
+    and returns class (or None), rule number (0 for none) and status; for a rule base
+    also `strengths(...)`; and `answer(values)` for the inputs in order. Of a fuzzy
+    system it offers `infer(...)` and `answer(values)`, which return outputs, status and
+    activations. Run as a program it tests itself. A category is its name, or its place
+    among the categories.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         allow_loss: Of no effect: nothing is lost.
 
     Example:
@@ -104,26 +135,32 @@ def write_python(model: Model, /, *, allow_loss: bool = False) -> Written:
     """
     del allow_loss
     inputs = [variable for variable in model.variables if not variable.parts]
+    got, wrong = "answer(given)[:3]", "got != expected"
+    if isinstance(model, FuzzySystem):
+        got = "numbers(given)[: len(expected)]"
+        wrong = "not all(map(is_near, got, expected, *bounds))"
     text = "".join(
         [
             *_heading(model),
             _START,
             *_lines("INPUTS", (_literal(v.name) + f",  # {v.unit!r}" for v in inputs)),
             *_categories(inputs),
-            *(_tree(model) if isinstance(model, FuzzyTree) else _rules(model)),
-            *_doors(inputs, has_strengths=isinstance(model, RuleBase)),
+            *_body(model),
+            *_doors(model, inputs),
             *_lines("EXAMPLES", _examples(model), gap="\n\n"),
-            _TEST,
+            _TEST.replace("@got@", got).replace("@wrong@", wrong),
         ]
     )
     return Written(text.encode("utf-8"))
 
 
-def _heading(model: Model) -> Iterator[str]:
+def _heading(model: Document) -> Iterator[str]:
     yield "# -*- coding: utf-8 -*-\n"  # so that no name below can declare another
     yield f"# {title_of(model, repr(model.name))}. Written by fuzzytree.\n"
     yield f"# Fingerprint: {fingerprint(model)}\n"
-    yield f"# Classes: {', '.join(map(repr, model.classes))}\n\n"
+    if not isinstance(model, FuzzySystem):
+        yield f"# Classes: {', '.join(map(repr, model.classes))}\n"
+    yield "\n"
 
 
 def _lines(name: str, entries: Iterable[str], gap: str = "\n") -> Iterator[str]:
@@ -150,6 +187,22 @@ def _literal(value: object) -> str:
             return repr(value)
 
 
+def _body(model: Document) -> Iterator[str]:
+    match model:
+        case FuzzyTree():
+            yield from _tree(model)
+        case RuleBase():
+            yield from _lines("CLASSES", (f"{label!r}," for label in model.classes))
+            titles = [*_DECISION[:3], *map(sentence, model.rules)]
+            yield from _numbers(from_rules(model), _DECISION, titles)
+            yield _RULES.replace("@values@", _values(model))
+        case FuzzySystem():
+            names = (f"{one.name!r},  # {one.unit!r}" for one in model.outputs)
+            yield from _lines("OUTPUTS", names)
+            yield from _numbers(from_system(model, activations=True), _INFERENCE)
+            yield _SYSTEM.replace("@values@", _values(model))
+
+
 def _tree(tree: FuzzyTree) -> Iterator[str]:
     places = places_of(tree.variables)
     yield "\n# Line of the variable, cuts, and for each interval the next node's place"
@@ -172,27 +225,31 @@ def _tree(tree: FuzzyTree) -> Iterator[str]:
     yield _TREE.replace("@missing@", repr(tree.semantics.missing))
 
 
-def _rules(rules: RuleBase) -> Iterator[str]:
-    program = from_rules(rules)
+def _numbers(
+    program: Program, kinds: Sequence[ResultKind], titles: Sequence[str] = ()
+) -> Iterator[str]:
+    """Yield the function `numbers`, and the tables and functions that it needs."""
     steps = _Steps(program)
     body = list(steps.body())
-    first = [place for kind in _FIRST for place in program.of(kind)]
-    yield from _lines("CLASSES", (f"{label!r}," for label in rules.classes))
+    results = [one for kind in kinds for one in program.results if one.kind == kind]
+    titles = titles or [one.title for one in results]
+    lines = [
+        f"        {steps.value(result.step)},  # {title!r}\n"
+        for result, title in zip(results, titles, strict=True)
+    ]
     for numbers, name in steps.tables.items():
         yield f"\n{name} = {numbers}\n"
+    *others, last = kinds
     yield "\n\ndef numbers(x):\n"
-    yield '    """Return class, rule, status and strengths as numbers."""\n'
+    yield f'    """Return {", ".join(others)} and {last} as numbers."""\n'
     yield from body
     yield "    return [\n"
-    yield from (f"        {steps.value(place)},\n" for place in first)
-    for rule, place in zip(rules.rules, program.of("strength"), strict=True):
-        yield f"        {steps.value(place)},  # {sentence(rule)!r}\n"
+    yield from lines
     yield "    ]\n"
     yield from steps.helpers()
-    yield _RULES.replace("@values@", _values(rules))
 
 
-def _values(model: Model) -> str:
+def _values(model: Document) -> str:
     """Return what makes numbers of the values of the inputs."""
     if any(variable.categories for variable in model.variables):
         return "[*map(number, values, CATEGORIES)]"
@@ -205,6 +262,41 @@ def _categories(inputs: Sequence[Variable]) -> Iterator[str]:
         names = (f"{_literal(one.categories)},  # {one.name!r}" for one in inputs)
         yield from _lines("CATEGORIES", names)
         yield _NUMBER
+
+
+_CALLS: Mapping[str, str] = {
+    "absolute": "abs({})",
+    "floor": "whole(math.floor, {})",
+    "ceiling": "whole(math.ceil, {})",
+    "round": "whole(round, {})",
+    "square_root": "quiet(math.sqrt, {})",
+    "exponential": "quiet(math.exp, {})",
+    "logarithm": "quiet(math.log, {})",
+    "logarithm_10": "quiet(math.log10, {})",
+    "logarithm_1p": "quiet(math.log1p, {})",
+    "sine": "quiet(math.sin, {})",
+    "cosine": "quiet(math.cos, {})",
+    "tangent": "quiet(math.tan, {})",
+    "arc_sine": "quiet(math.asin, {})",
+    "arc_cosine": "quiet(math.acos, {})",
+    "arc_tangent": "quiet(math.atan, {})",
+    "hyperbolic_sine": "quiet(math.sinh, {})",
+    "hyperbolic_cosine": "quiet(math.cosh, {})",
+    "hyperbolic_tangent": "quiet(math.tanh, {})",
+    "area_sine": "quiet(math.asinh, {})",
+    "area_cosine": "quiet(math.acosh, {})",
+    "area_tangent": "quiet(math.atanh, {})",
+    "remainder": "quiet(math.fmod, {}, {})",
+    "arc_tangent_2": "math.atan2({}, {})",
+    "is_finite": "math.isfinite({})",
+    "below": "float(bisect_left({}, {}))",
+    "total": "total({})",
+    "running": "list(accumulate({}))",
+    "last": "{}[-1]",
+    "highest": "reduce(maximum, {})",
+    "lowest": "reduce(minimum, {})",
+}
+"""What operations call, where that is no function of their name and of two numbers."""
 
 
 class _Steps(ScriptSteps):
@@ -226,14 +318,63 @@ def maximum(a, b):
         "divide": """
 
 def divide(a, b):
-    \"\"\"Return a / b; of a division by 0, which no prediction uses, NaN.\"\"\"
-    return a / b if b else math.nan
+    \"\"\"Return a / b; of a division by 0 an infinity, of 0 by 0 NaN.\"\"\"
+    if b:
+        return a / b
+    sign = math.copysign(1.0, b)
+    return math.copysign(math.inf, a) * sign if a and a == a else math.nan
 """,
         "pick": """
 
 def pick(table, place):
     \"\"\"Return the number of a table at a place, its first one if there is none.\"\"\"
     return table[int(place) if 0 <= place < len(table) else 0]
+""",
+        "whole": """
+
+def whole(function, a):
+    \"\"\"Return a as a whole number, of the sign of a.\"\"\"
+    return math.copysign(float(function(a)), a) if math.isfinite(a) else a
+""",
+        "quiet": """
+
+def quiet(function, *values):
+    \"\"\"Return what C makes of numbers: where Python fails, NaN or an infinity.\"\"\"
+    try:
+        return function(*values)
+    except OverflowError:
+        is_negative = function is math.sinh and values[0] < 0.0
+        return -math.inf if is_negative else math.inf
+    except ValueError:
+        poles = {math.log: 0.0, math.log10: 0.0, math.log1p: -1.0}
+        if values[0] == poles.get(function):
+            return -math.inf
+        if function is math.atanh and abs(values[0]) == 1.0:
+            return math.copysign(math.inf, values[0])
+        return math.nan
+""",
+        "power": """
+
+def power(a, b):
+    \"\"\"Return a to the power b as C has it.\"\"\"
+    try:
+        return math.pow(a, b)
+    except (OverflowError, ValueError):
+        if a < 0.0 and math.fmod(b, 1.0):
+            return math.nan
+        is_negative = math.copysign(1.0, a) < 0.0 and abs(math.fmod(b, 2.0)) == 1.0
+        return -math.inf if is_negative else math.inf
+""",
+        "total": """
+
+def total(numbers):
+    \"\"\"Return the sum by halves: the second half is added to the first.\"\"\"
+    size = 1 << (len(numbers) - 1).bit_length()
+    numbers = numbers + [0.0] * (size - len(numbers))
+    while size > 1:
+        size //= 2
+        numbers = [a + b for a, b in zip(numbers[:size], numbers[size:])]
+    return numbers[0]
 """,
     }
     signs: ClassVar[Mapping[str, str]] = {
@@ -248,17 +389,21 @@ def pick(table, place):
         """Return a value as Python source."""
         return _literal(value)
 
+    def expression(self, step: Step) -> str:
+        """Return a step as an expression; of samples, as a list of them."""
+        if step.operation in OVER_SAMPLES or step.operation == "running":
+            return self.call(step, [self.variable.format(*step.arguments)])
+        text = super().expression(step)
+        return f"[{text} for i in range({step.samples})]" if step.samples else text
+
     def call(self, step: Step, operands: Sequence[str]) -> str:
         """Return a step as the call of a function."""
-        if step.operation == "is_finite":
-            return f"math.isfinite({operands[0]})"
-        if step.operation == "below":
-            return f"bisect_left({self.table(step.table)}, {operands[0]})"
         if step.operation == "divide" and self.still[step.arguments[1]]:
             return f"{operands[0]} / {operands[1]}"
-        self.needs.add(step.operation)
+        template = _CALLS.get(step.operation, f"{step.operation}({{}}, {{}})")
+        self.needs.update(re.findall(r"\w+", template))
         tables = [self.table(step.table)] if step.table else []
-        return f"{step.operation}({', '.join([*tables, *operands])})"
+        return template.format(*tables, *operands)
 
 
 def parameters(names: Sequence[str]) -> tuple[str, ...]:
@@ -285,21 +430,30 @@ def parameters(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(result)
 
 
-def _doors(inputs: Sequence[Variable], *, has_strengths: bool) -> Iterator[str]:
+def _doors(model: Document, inputs: Sequence[Variable]) -> Iterator[str]:
     names = parameters([variable.name for variable in inputs])
     takes = ", ".join(["*", *names]) if names else ""
     values = "".join(f"{n}, " for n in names).strip()
     doors = [("decide", "class, number of the rule and status", "[:3]")]
-    if has_strengths:
+    if isinstance(model, RuleBase):
         doors.append(("strengths", "the strength of every rule", "[3]"))
+    if isinstance(model, FuzzySystem):
+        doors = [("infer", "outputs, status and activations", "")]
     for name, what, part in doors:
         yield f"\n\ndef {name}({takes}):\n"
         yield f'    """Return {what}; each input is given by name."""\n'
         yield f"    return answer(({values})){part}\n"
 
 
-def _examples(model: Model) -> Iterator[str]:
+def _examples(model: Document) -> Iterator[str]:
     """Yield rows and the predictions of the reference, the last with missing values."""
+    if isinstance(model, FuzzySystem):
+        inputs = system_probes(model, limit=_EXAMPLES)
+        inputs.append(dict.fromkeys(model.inputs, math.nan))
+        for given, outputs, bounds, number in system_examples(model, inputs):
+            row_of = tuple(given), (*outputs, float(number)), (*bounds, 0.0)
+            yield f"{_literal(row_of)},"
+        return
     rows = probes(model, limit=_EXAMPLES)
     if model.inputs:
         rows.append(dict.fromkeys(model.inputs, math.nan))
@@ -313,7 +467,7 @@ def _examples(model: Model) -> Iterator[str]:
 FORMAT = Format(
     name="python",
     suffixes=(".py",),
-    carries=("tree", "rules"),
+    carries=("tree", "rules", "system"),
     write=write_python,
     dtype="float64",
 )

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import math
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
-from fuzzytree.exporters.python import FORMAT, parameters, write_python
+from fuzzytree.checking.comparing import same_bits
+from fuzzytree.exporters.python import (
+    _START,
+    FORMAT,
+    _numbers,
+    parameters,
+    write_python,
+)
 from fuzzytree.model.rulebase import (
     Band,
     Part,
@@ -26,9 +34,13 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.runtimes.table import find_runtime
+from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import system_probes
+from fuzzytree.semantics.programs.operations import NUMERIC, OPERATIONS
+from fuzzytree.semantics.programs.steps import Maker, result_of
 from fuzzytree.semantics.reference import descend, evaluate
-from fuzzytree.testing import probes, random_tree
+from fuzzytree.testing import probes, random_system, random_tree
 
 HOSTILE = (
     "import os; os.abort() #",
@@ -76,6 +88,40 @@ def test_decide_and_strengths_have_the_bits_of_the_reference(kind: str) -> None:
         if kind != "tree":
             found = space["strengths"](**row)
             np.testing.assert_array_equal(found, answer.strengths)
+
+
+@pytest.mark.parametrize("formulas", ["tame", "wild"])
+def test_systems_have_the_bits_of_the_reference(
+    formulas: Literal["tame", "wild"],
+) -> None:
+    for seed in range(24):
+        system = random_system(seed, formulas=formulas, has_odd_names=seed % 2 == 0)
+        answer = executed(write_python(system).content)["answer"]
+        for row in system_probes(system, limit=60):
+            right = infer(system, row)
+            outputs, status, activations = answer([row[n] for n in system.inputs])
+            assert status == right.status
+            given = np.array([*outputs, *activations])
+            wanted = np.array([*right.outputs, *right.activations])
+            assert same_bits(given, wanted).all(), seed
+
+
+def test_what_python_fails_at_is_what_c_makes_of_it() -> None:
+    numbers = (0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 3.0, -3.0, 1e308, math.inf, math.nan)
+    for name, operation in NUMERIC.items():
+        make = Maker()
+        count = len(OPERATIONS[name].takes)
+        inputs = tuple(f"x{k}" for k in range(count))
+        if name == "where":
+            continue
+        place = make(name, *map(make.input, inputs))
+        program = make.program("p", inputs, (result_of("output", "y", place),))
+        space = executed(
+            "".join([_START, *_numbers(program, ("output", "status"))]).encode()
+        )
+        for row in itertools.product(numbers, repeat=count):
+            given = np.array(space["numbers"](row))
+            assert same_bits(given, np.array([operation(*row)])).all(), (name, row)
 
 
 def test_hostile_names_stay_text() -> None:
@@ -138,6 +184,21 @@ def test_a_tree_of_any_depth_can_be_written_and_run() -> None:
     tree = chain(1500)
     run = find_runtime("python").load(tree)
     assert run(np.array([[0.0, 700.5, 1e9]])).rule.tolist() == [1, 701, 1501]
+
+
+@pytest.mark.parametrize("seed", [1, 4, 9])
+def test_a_system_tests_itself(tmp_path: Path, seed: int) -> None:
+    file = tmp_path / "system.py"
+    content = write_python(random_system(seed)).content
+    file.write_bytes(content)
+    command = [sys.executable, "-I", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.endswith(" examples answered as expected\n")
+    broken = content.replace(b"    return [\n        ", b"    return [\n        1.0 + ")
+    file.write_bytes(broken)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "instead of" in done.stderr
 
 
 def test_the_file_tests_itself_and_reports_a_changed_number(tmp_path: Path) -> None:
