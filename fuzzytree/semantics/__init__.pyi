@@ -79,6 +79,7 @@ from .programs.steps import result_of as result_of
 from .programs.system_program import from_system as from_system
 from .programs.tree_program import from_tree as from_tree
 from .programs.tree_program import program_of as program_of
+from .programs.unrolling import unrolled as unrolled
 from .random_systems import random_rows as random_rows
 from .random_systems import random_system as random_system
 from .reference import BELOW_ONE as BELOW_ONE
