@@ -19,7 +19,8 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.checking.comparing import same_bits
-from fuzzytree.exporters.sql import Dialect, write
+from fuzzytree.exporters.sql import write
+from fuzzytree.exporters.sql_text import Dialect
 from fuzzytree.model.contracts import Model, Outcome
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes.table import find_runtime
