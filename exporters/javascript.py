@@ -120,13 +120,10 @@ def write(
 
 
 def _doors(model: Document) -> tuple[str, ...]:
-    match model:
-        case FuzzyTree():
-            return ("INPUTS", "CLASSES", "decide", "answer", "selfTest")
-        case RuleBase():
-            return ("INPUTS", "CLASSES", "decide", "strengths", "answer", "selfTest")
-        case FuzzySystem():
-            return ("INPUTS", "OUTPUTS", "infer", "answer", "selfTest")
+    if model.outputs:
+        return ("INPUTS", "OUTPUTS", "infer", "answer", "selfTest")
+    strengths = ("strengths",) if model.rules else ()
+    return ("INPUTS", "CLASSES", "decide", *strengths, "answer", "selfTest")
 
 
 def _body(model: Document, *, probabilities: bool) -> Iterator[str]:
@@ -228,8 +225,7 @@ def _numbers(
 
 def _examples(model: Model, *, probabilities: bool = False) -> Iterator[str]:
     """Yield rows and the predictions of the reference."""
-    rules = len(model.rules) if isinstance(model, RuleBase) else 1
-    most = min(_MOST_EXAMPLES, _STRENGTHS // rules)
+    most = min(_MOST_EXAMPLES, _STRENGTHS // max(len(model.rules), 1))
     for row in few_probes(model, max(most, _FEWEST_EXAMPLES)):
         values = [row[name] for name in model.inputs]
         one = answer_of(model, row)

@@ -100,12 +100,12 @@ def write(
     """
     if curves not in ("exact", "points"):
         raise ValueError(f"curves are exact or points, not {curves!r}")
-    if curves == "points" and not isinstance(model, RuleBase):
-        raise ValueError("curves: points are for rules; a tree or a system is none")
     if probabilities:
         check_rated(model, "pmml")
     losses: tuple[Loss, ...] = ()
-    if isinstance(model, RuleBase) and curves == "points":
+    if curves == "points":
+        if not isinstance(model, RuleBase):
+            raise ValueError("curves: points are for rules; a tree or a system is none")
         model, losses = pointed(model, tolerance)
         if losses and not allow_loss:
             raise refusal(model.name, "pmml", losses)

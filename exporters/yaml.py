@@ -128,6 +128,7 @@ def _losses(model: Document) -> Iterator[Loss]:
                 yield from _long(f"rule {number}", [texts[id(p)] for p in rule.when])
         case FuzzyTree():
             counts = [(f"leaf {n}", r.support) for n, r in enumerate(model.leaves, 1)]
+            yield from name_losses(("pattern", leaf.pattern) for leaf in model.leaves)
     for where, count in counts:
         if count is not None and count > LARGEST_COUNT:
             yield Loss(where, f"the support is above {LARGEST_COUNT}")
@@ -136,22 +137,18 @@ def _losses(model: Document) -> Iterator[Loss]:
 def _names(model: Document) -> Iterator[tuple[str, str]]:
     """Yield every text of a model that is a name, and what it is the name of."""
     yield "name", model.name
-    if not isinstance(model, FuzzySystem):
-        yield from (("class", name) for name in model.classes)
-        yield from (("column", name) for name in model.columns)
-    outputs = model.outputs if isinstance(model, FuzzySystem) else ()
-    for variable in model.variables + outputs:
+    yield from (("class", name) for name in model.classes)
+    yield from (("column", name) for name in model.columns)
+    variables: list[Variable | SystemOutput] = [*model.variables, *model.outputs]
+    for variable in variables:
         yield "variable", variable.name
         yield "unit", variable.unit
         if not isinstance(variable, SystemOutput):
             yield from (("category", name) for name in variable.categories)
         yield from (("term", term.name) for term in variable.terms)
-    if isinstance(model, FuzzyTree):
-        yield from (("pattern", leaf.pattern) for leaf in model.leaves)
-        yield from (("set", term.name) for group in model.sets for term in group.terms)
-    if isinstance(model, FuzzySystem):
-        yield from (("block", block.name) for block in model.blocks)
-        yield from (("rule", rule.name) for rule in model.rules)
+    yield from (("set", term.name) for group in model.sets for term in group.terms)
+    yield from (("block", block.name) for block in model.blocks)
+    yield from (("rule", rule.name) for block in model.blocks for rule in block.rules)
 
 
 def _rule_base(rules: RuleBase) -> dict[str, Entry]:

@@ -162,6 +162,11 @@ class FuzzyTree(Value, frozen=True):
         return ()
 
     @property
+    def blocks(self) -> tuple[()]:
+        """The blocks of a system's rules: none."""
+        return ()
+
+    @property
     def rule_labels(self) -> tuple[str, ...]:
         """The class of each leaf, in order."""
         return tuple(leaf.label for leaf in self.leaves)

@@ -158,8 +158,9 @@ def test_what_engines_do_not_hold_is_refused() -> None:
     with pytest.raises(LossError) as refused:
         write(many)
     assert str(refused.value) == (
-        "cannot write many as sql for sqlite: a step of it has 2002 columns, and SQLite "
-        "takes 2000; take fewer samples or rules, or write C, JavaScript or Python"
+        "cannot write many as sql for sqlite: a step of it has 2002 columns, and "
+        "SQLite takes 2000; take fewer samples or rules, or write C, JavaScript or "
+        "Python"
     )
     assert len(write(many, dialect="duckdb").content) > 100_000
 
