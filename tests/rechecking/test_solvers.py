@@ -316,7 +316,7 @@ def test_values_names_and_missing_are_asserted() -> None:
 
 def test_a_system_that_no_solver_reads_is_refused_by_name() -> None:
     system = ft.read(EXAMPLES / "tipper.fll").model
-    block = system.blocks[0]  # type: ignore[union-attr]
+    block = system.blocks[0]
     other = msgspec.structs.replace(block, disjunction="algebraic_sum")
     system = msgspec.structs.replace(system, blocks=(other,))
     with pytest.raises(CannotRunError) as caught:
