@@ -46,8 +46,7 @@ class Passing(NamedTuple):
 
 def data_of(model: FuzzyTree | RuleBase | FuzzySystem, rows: AuditRows) -> Data:
     """Return the rows on every axis of a model."""
-    classes = () if isinstance(model, FuzzySystem) else model.classes
-    classes = () if rows.codes is None else classes
+    classes = () if rows.codes is None else model.classes
     plan = plan_axes(model.variables)
     with np.errstate(over="ignore", invalid="ignore"):  # no finite number is drawn
         lines = np.asarray(axis_lines(plan, rows.values), np.float64)

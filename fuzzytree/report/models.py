@@ -50,16 +50,15 @@ _MOST_PARTS = 12  # of a combination, where it must fit into a line
 def model_lines(model: Document) -> Iterator[str]:
     """Yield a model as a person reads it: head, tree, rules, terms."""
     yield from head_lines(model)
-    if isinstance(model, FuzzySystem):
-        start = 1
-        for block in model.blocks:
-            yield ""
-            yield from _block_lines(block, start)
-            start += len(block.rules)
+    start = 1
+    for block in model.blocks:
         yield ""
+        yield from _block_lines(block, start)
+        start += len(block.rules)
+    yield ""
+    if isinstance(model, FuzzySystem):
         yield from term_lines(model.all_variables, model.inputs)
         return
-    yield ""
     if isinstance(model, FuzzyTree):
         yield from tree_lines(model)
         yield ""
@@ -98,13 +97,13 @@ def document_text(model: Document) -> str:
         >>> document_text(random_tree(1, leaves=2))
         'tree, 1 node, 2 leaves, depth 1, 1 input, 3 classes'
     """
-    if isinstance(model, FuzzySystem):
-        return (
-            f"fuzzy system, {counted(len(model.inputs), 'input')}, "
-            f"{counted(len(model.outputs), 'output')}, "
-            f"{counted(len(model.rules), 'rule')}, {counted(_terms(model), 'term')}"
-        )
     inputs = counted(len(model.inputs), "input")
+    if isinstance(model, FuzzySystem):
+        outputs, rules = len(model.outputs), len(model.rules)
+        return (
+            f"fuzzy system, {inputs}, {counted(outputs, 'output')}, "
+            f"{counted(rules, 'rule')}, {counted(_terms(model), 'term')}"
+        )
     classes = counted(len(model.classes), "class", "classes")
     return f"{kind_text(model)}, {inputs}, {classes}"
 
@@ -116,18 +115,17 @@ def document_facts(model: Document) -> dict[str, object]:
         "name": model.name,
         "inputs": model.inputs,
     }
-    if isinstance(model, FuzzySystem):
-        facts["outputs"] = tuple(one.name for one in model.outputs)
+    if model.outputs:
+        facts["outputs"] = tuple(output.name for output in model.outputs)
     else:
         facts["classes"] = model.classes
-    rules = model.leaves if isinstance(model, FuzzyTree) else model.rules
-    return {**facts, "rules": len(rules), "terms": _terms(model)}
+    rules = len(model.rule_labels) or len(model.rules)
+    return {**facts, "rules": rules, "terms": _terms(model)}
 
 
 def _terms(model: Document) -> int:
-    count = sum(len(one.terms) for one in model.variables)
-    outputs = model.outputs if isinstance(model, FuzzySystem) else ()
-    return count + sum(len(one.terms) for one in outputs)
+    count = sum(len(variable.terms) for variable in model.variables)
+    return count + sum(len(output.terms) for output in model.outputs)
 
 
 def onnx_facts(model: OnnxModel) -> dict[str, object]:
@@ -163,14 +161,14 @@ def head_lines(model: Document) -> Iterator[str]:
         yield f"outputs  {len(model.outputs)}: {names}"
         yield "answers  missing value: nan"
         return
-    fuzzy = "fuzzy " if isinstance(model, FuzzyTree) else ""
+    fuzzy = "" if model.rules else "fuzzy "
     yield f"{model.name}: {fuzzy}{kind_text(model)}"
     of = f" of {len(model.columns)} columns" if model.columns else ""
     yield f"inputs   {len(model.inputs)}{of}: {', '.join(model.inputs) or 'none'}"
     yield f"classes  {len(model.classes)}: {', '.join(model.classes)}"
     semantics = model.semantics
     answers = f"missing value: {missing_text(model)}"
-    if isinstance(model, RuleBase):
+    if model.rules:
         answers += f"; no rule fires: {semantics.uncovered or 'no class'}"
         answers += f"; AND is {semantics.conjunction}; the first of the strongest wins"
     yield f"answers  {answers}"
