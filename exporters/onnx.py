@@ -28,6 +28,7 @@ from fuzzytree.model import (
     kind_of,
     narrowing_refusal,
     stand_ins,
+    text_fault,
 )
 from fuzzytree.semantics import from_rules, from_system
 
@@ -89,6 +90,7 @@ def write_onnx(
     opset: int = 17,
     ir: int = 8,
     signature: Signature = "needed",
+    columns: Sequence[str] = (),
     outputs: Sequence[Output] | None = None,
     readable: bool = False,
     plain: bool = False,
@@ -117,7 +119,9 @@ def write_onnx(
         ir: The version of the file, 4 to 13.
         signature: `needed` for the model's inputs as columns, `all` for all columns
             of the training table, of which the others are ignored; so for a model that
-            needs none.
+            needs none. Rows of any width are taken if it knows no columns either.
+        columns: The columns of the rows that the graph will get, in their order, the
+            model's inputs among them; `signature` says which unless given.
         outputs: Which outputs, in this order: unless given, `label` and `rule`, of a
             system `outputs` and `status`.
         readable: Whether each operation is a node, named after what it computes, such
@@ -147,6 +151,7 @@ def write_onnx(
     usual: Sequence[Output] = ("outputs", "status") if is_system else ("label", "rule")
     outputs = usual if outputs is None else outputs
     _check_options(model, dtype, opset, ir, signature, outputs)
+    columns = _columns(model, signature, columns)
     _check_variants(model, readable=readable, plain=plain)
     require("onnx", "writing onnx needs")
     if verify:
@@ -157,7 +162,7 @@ def write_onnx(
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, f"onnx {dtype}", lost)
     proto = _model_proto(
-        model, dtype, opset, ir, signature, outputs, readable=readable, plain=plain
+        model, dtype, opset, ir, columns, outputs, readable=readable, plain=plain
     )
     content: bytes = proto.SerializeToString(deterministic=True)
     if verify:
@@ -167,7 +172,7 @@ def write_onnx(
         onnx_session.prove(
             content,
             model,
-            _columns(model, signature),
+            columns,
             outputs,
             kind=NUMBERS[dtype].axis,
             is_exact=dtype == "float64" or (dtype == "mixed" and _is_tree(model)),
@@ -243,7 +248,21 @@ def require(package: str, purpose: str) -> None:
         raise MissingExtraError(f"{purpose} {install_hint('onnx')}")
 
 
-def _columns(model: Model | FuzzySystem, signature: Signature) -> tuple[str, ...]:
+def _columns(
+    model: Model | FuzzySystem, signature: Signature, columns: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the columns of the input; none if rows of any width are taken.
+
+    Raises:
+        ValueError: If one stands twice, or one that the model needs is not there.
+    """
+    if columns:
+        is_wrong = len(set(columns)) < len(columns) or any(map(text_fault, columns))
+        lacking = [repr(name) for name in model.inputs if name not in columns]
+        if is_wrong or lacking:
+            needed = f"; the model also needs {', '.join(lacking)}" if lacking else ""
+            raise ValueError(f"columns: name each once, not {tuple(columns)!r}{needed}")
+        return tuple(columns)
     if not isinstance(model, FuzzySystem) and (
         signature == "all" or not model.inputs  # rows of no column cannot be given
     ):
@@ -256,7 +275,7 @@ def _model_proto(
     dtype: Dtype,
     opset: int,
     ir: int,
-    signature: Signature,
+    columns: Sequence[str],
     outputs: Sequence[Output],
     *,
     readable: bool,
@@ -277,7 +296,6 @@ def _model_proto(
 
     numbers = NUMBERS[dtype]
     graph = OnnxGraph(opset, numbers)
-    columns = _columns(model, signature)
     degree, rules = np_to_onnx(numbers.degree), _rule_count(model)
     kinds: dict[Output, tuple[int, list[str | int]]] = {
         "label": (TensorProto.STRING, ["rows"]),
@@ -312,7 +330,7 @@ def _model_proto(
     return model_proto(
         graph,
         facts["carrier"],
-        ("inputs", np_to_onnx(numbers.axis), ["rows", len(columns)]),
+        ("inputs", np_to_onnx(numbers.axis), ["rows", len(columns) or "columns"]),
         {name: kinds[name] for name in outputs},
         ir=ir,
         text=_in_words(model, dtype),
@@ -332,18 +350,18 @@ def _facts(
 ) -> dict[str, str]:
     """Return the metadata: plain words where possible, JSON for lists and records."""
     kind: str = kind_of(model)
-    inputs, classes, semantics = columns, tuple[str, ...](), {}
+    classes, semantics = tuple[str, ...](), {}
     names: dict[str, object] = {}
     if isinstance(model, FuzzySystem):
         names["names"] = [one.name for one in model.outputs]
     else:
-        inputs, classes = model.inputs, model.classes
+        classes = model.classes
         semantics = msgspec.to_builtins(model.semantics)
         kind = "descent" if isinstance(model, FuzzyTree) else model.kind or kind
-    units = {one.name: one.unit for one in model.variables if one.name in inputs}
+    units = {one.name: one.unit for one in model.variables if one.name in columns}
     records: dict[str, object] = {
         "columns": list(columns),
-        "inputs": list(inputs),
+        "inputs": list(model.inputs),
         "units": [units.get(name, "") for name in columns],
         "classes": list(classes),
         "rules": _rule_count(model),

@@ -67,11 +67,10 @@ def differences(
     versions = {entry.domain: entry.version for entry in result.opset_import}
     if write is None:
         write = write_onnx
-        needed = json.loads(facts["columns"]) == list(model.inputs)
         options = {
             "allow_loss": True,
             "dtype": facts["dtype"],
-            "signature": "needed" if needed else "all",
+            "columns": json.loads(facts["columns"]),
             "readable": facts.get("form") == "readable",
             "verify": False,
         }
