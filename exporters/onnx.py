@@ -75,6 +75,10 @@ OLDEST: Mapping[str, str] = {
 within their bounds; 1.15 is the oldest there is for Python 3.11, and `TreeEnsemble`
 came with 1.21."""
 
+_NO_TREES = (
+    "OpenVINO has no TreeEnsemble and computes in float32: write for it with "
+    "plain=true and dtype=float32"
+)
 _OF_MODELS: tuple[Output, ...] = (
     *("label", "rule", "strengths", "status", "probabilities"),
 )
@@ -177,7 +181,8 @@ def write_onnx(
             kind=NUMBERS[dtype].axis,
             is_exact=dtype == "float64" or (dtype == "mixed" and _is_tree(model)),
         )
-    return Written(content, lost)
+    has_trees = any(entry.domain == "ai.onnx.ml" for entry in proto.opset_import)
+    return Written(content, lost, (_NO_TREES,) if has_trees else ())
 
 
 def _is_tree(model: Model | FuzzySystem) -> bool:

@@ -18,6 +18,11 @@ from tests.cli.conftest import Call, grip
 
 HELP = "\n  fuzzytree export --help lists the options\n"
 
+FOR_OPENVINO = (
+    "OpenVINO has no TreeEnsemble and computes in float32: write for it with "
+    "plain=true and dtype=float32"
+)
+
 
 @pytest.fixture(autouse=True)
 def _here(folder: Path) -> None:
@@ -33,6 +38,7 @@ def test_size_and_hash_of_the_file_are_reported(call: Call) -> None:
         f"wrote    new.onnx onnx, {len(content)} bytes, sha256 {digest}\n"
         "bound    float64  the class cannot change: "
         "no value is rounded before it meets a cut\n"
+        f"remark   {FOR_OPENVINO}\n"
         "next     fuzzytree check grip.yaml new.onnx\n"
     )
 
@@ -50,7 +56,7 @@ def test_json_reports_the_same_facts(call: Call) -> None:
         "bytes": len(content),
         "sha256": hashlib.sha256(content).hexdigest(),
         "losses": [],
-        "remarks": [],
+        "remarks": [FOR_OPENVINO],
         "names": {},
         "proof": {
             "verdict": "certified",

@@ -10,6 +10,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -19,8 +20,9 @@ import pytest
 from fuzzytree.errors import DisagreementError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format, onnx_ends
 from fuzzytree.exporters.onnx import FORMAT, IRS, OPSETS, Output, write_onnx
+from fuzzytree.exporters.onnx_compare import differences
 from fuzzytree.exporters.onnx_graph import OnnxGraph
-from fuzzytree.model.contracts import Dtype, Model
+from fuzzytree.model.contracts import Document, Dtype, Model
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -38,7 +40,7 @@ from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.numerics.narrowing import rounded
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import evaluate
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "onnx"
 EVERY: tuple[Output, ...] = ("label", "rule", "status", "strengths")
@@ -230,11 +232,37 @@ def test_other_columns_of_a_full_signature_are_ignored() -> None:
         assert _answers(content, values)["rule"].tolist() == [1, 3, 0]
 
 
-def test_a_model_without_inputs_answers_every_row() -> None:
+@pytest.mark.parametrize("width", [0, 1, 4])
+def test_a_model_without_inputs_answers_rows_of_any_width(width: int) -> None:
     tree = FuzzyTree("one", ("a",), (), (), (Leaf("a"),))
     for model in (tree, rules_from_tree(tree)):
-        found = _answers(write_onnx(model).content, np.zeros((3, 0)))
+        found = _answers(write_onnx(model).content, np.full((3, width), np.nan))
         assert found["label"].tolist() == ["a", "a", "a"]
+
+
+@pytest.mark.parametrize(
+    ("model", "options"),
+    [
+        (grip_tree(), {}),
+        (grip_tree(), {"plain": True}),
+        (rules_from_tree(grip_tree()), {}),
+        (rules_from_tree(grip_tree()), {"readable": True}),
+        (random_system(3, formulas="none"), {"outputs": ("outputs", "status")}),
+    ],
+    ids=["tree", "plain tree", "rules", "readable rules", "system"],
+)
+def test_the_columns_of_the_callers_rows_can_be_any(
+    model: Document, options: dict[str, Any]
+) -> None:
+    columns = ("row id", *reversed(model.inputs), "note")
+    content = write_onnx(model, columns=columns, **options).content
+    values = np.random.default_rng(0).random((50, len(model.inputs)))
+    table = np.full((50, len(columns)), np.nan)
+    table[:, 1:-1] = values[:, ::-1]
+    right = _answers(write_onnx(model, **options).content, values)
+    for name, array in _answers(content, table).items():
+        np.testing.assert_array_equal(array, right[name])
+    assert not any(differences(content, model))
 
 
 @pytest.mark.parametrize("opset", [OPSETS[0], 13, 17, 18, 21, OPSETS[-1]])
@@ -336,6 +364,10 @@ def test_wrong_options_are_refused_by_name() -> None:
     )
     assert refused(tree, readable=True) == (
         "readable is for rules: a tree's graph has no rules"
+    )
+    assert refused(rules, columns=("a", "b", "a")) == (
+        "columns: name each once, not ('a', 'b', 'a'); the model also needs "
+        + ", ".join(map(repr, rules.inputs))
     )
     assert refused(rules, signature="all") == (
         "'slips' does not know the columns of its training table, "
