@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.exporters.program_text import StepText, strengths_of
-from fuzzytree.exporters.st_text import StNumbers, remark, table
+from fuzzytree.exporters.st_text import Declaration, StNumbers, remark, table
 from fuzzytree.model import RuleBase, sentence
 from fuzzytree.semantics import BELOW_ONE, Program, Step, still_results
 
@@ -38,8 +38,8 @@ class StSteps:
     """Statements of a program.
 
     Attributes:
-        declared: The type of each variable that they set, by name.
-        tables: The lines of the tables that they look into.
+        declared: The variables that they set, by name.
+        tables: The tables that they look into.
     """
 
     about = "a value for each sample"  # of its tables
@@ -50,8 +50,8 @@ class StSteps:
         """Prepare the statements."""
         self.program, self.inputs, self.numbers = program, inputs, numbers
         self.still = still_results(program)
-        self.declared: dict[str, str] = {}
-        self.tables: list[str] = []
+        self.declared: dict[str, Declaration] = {}
+        self.tables: list[Declaration] = []
         self._tables: dict[str, str] = {}
 
     def value(self, place: int) -> str:
@@ -108,7 +108,7 @@ class StSteps:
         key = f"{kind} {' '.join(entries)}"
         if key not in self._tables:
             self._tables[key] = f"t{len(self._tables)}"
-            self.tables += table(self._tables[key], kind, entries, self.about)
+            self.tables.append(table(self._tables[key], kind, entries, self.about))
         return self._tables[key]
 
 
@@ -223,9 +223,8 @@ class SystemSteps(StSteps):
     def _declare(self, name: str, step: Step) -> None:
         kind = self.numbers.name if name.startswith("v") else "BOOL"
         plain = name.removesuffix("[k]")
-        if plain != name:
-            kind = f"ARRAY [0..{step.samples - 1}] OF {kind}"
-        self.declared[plain] = kind
+        bounds = None if plain == name else (0, step.samples - 1)
+        self.declared[plain] = Declaration(plain, kind, bounds=bounds)
 
     def _one(self, place: int, step: Step) -> Iterator[str]:
         """Yield what sets one result."""
@@ -304,9 +303,9 @@ class SystemSteps(StSteps):
     def _total(self, plain: str, operands: str, count: int) -> Iterator[str]:
         """Yield the sum by halves: the second half is added to the first."""
         size = 1 << (count - 1).bit_length()
-        known = self.declared.get("halves", "[0..0]")
-        widest = max(size, int(known[known.index("..") + 2 : known.index("]")]) + 1)
-        self.declared["halves"] = f"ARRAY [0..{widest - 1}] OF {self.numbers.name}"
+        kind, known = self.numbers.name, self.declared.get("halves")
+        last = max(size - 1, known.bounds[1] if known and known.bounds else 0)
+        self.declared["halves"] = Declaration("halves", kind, bounds=(0, last))
         yield f"FOR k := 0 TO {count - 1} DO"
         yield f"    halves[k] := {operands};"
         yield "END_FOR;"
@@ -376,7 +375,7 @@ class RuleSteps(StSteps):
             return
         name = self.value(place)
         kinds = {"n": "DINT", "b": "BOOL", "v": self.numbers.name}
-        self.declared[name] = kinds[name[0]]
+        self.declared[name] = Declaration(name, kinds[name[0]])
         operands = [self.value(argument) for argument in step.arguments]
         if step.operation == "below":
             places, last = self.table(step.table), len(step.table) - 1

@@ -1,8 +1,9 @@
-"""Pieces of Structured Text: names, numbers, comments, tables."""
+"""Pieces of Structured Text: names, numbers, comments, declarations, a block."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -121,26 +122,87 @@ def remark(text: str) -> str:
     return one_line(text, ("(*", "*)", "/*", "*/"))
 
 
-def table(name: str, kind: str, entries: Sequence[str], about: str) -> Iterator[str]:
-    """Yield the declaration of a table, from place 0, with a comment."""
-    last = len(entries) - 1
-    yield f"    {name} : ARRAY [0..{last}] OF {kind} := [ (* {about} *)\n"
-    line = "       "
-    for place, entry in enumerate(entries):
-        piece = f" {entry}{',' if place < last else ''}"
-        if len(line) + len(piece) > _WIDTH:
-            yield f"{line}\n"
-            line = "       "
-        line += piece
-    yield f"{line}\n    ];\n"
+class Declaration(NamedTuple):
+    """A variable that a block declares.
+
+    Attributes:
+        name: Its name.
+        kind: Its type; of an array, that of an element.
+        about: Remarks: the first one stands beside it, others below.
+        bounds: The first and the last place of an array; None of a single value.
+        entries: The initial values of an array, if it has some.
+    """
+
+    name: str
+    kind: str
+    about: tuple[str, ...] = ()
+    bounds: tuple[int, int] | None = None
+    entries: tuple[str, ...] = ()
+
+    @property
+    def type(self) -> str:
+        """Its whole type."""
+        if self.bounds is None:
+            return self.kind
+        return f"ARRAY [{self.bounds[0]}..{self.bounds[1]}] OF {self.kind}"
+
+    def lines(self) -> Iterator[str]:
+        """Yield its text."""
+        comments = [f" (* {text} *)" for text in self.about] or [""]
+        if not self.entries:
+            yield f"    {self.name} : {self.type};{comments[0]}\n"
+            yield from (f"       {comment}\n" for comment in comments[1:])
+            return
+        yield f"    {self.name} : {self.type} := [{comments[0]}\n"
+        line = "       "
+        for number, entry in enumerate(self.entries, 1):
+            piece = f" {entry}{',' if number < len(self.entries) else ''}"
+            if len(line) + len(piece) > _WIDTH:
+                yield f"{line}\n"
+                line = "       "
+            line += piece
+        yield f"{line}\n    ];\n"
 
 
-def block_of(opening: str, lines: Sequence[str]) -> Iterator[str]:
-    """Yield a section of declarations; nothing if there are none."""
-    if lines:
-        yield f"{opening}\n"
-        yield from lines
-        yield "END_VAR\n"
+def table(name: str, kind: str, entries: Sequence[str], about: str) -> Declaration:
+    """Return the declaration of a table, from place 0, with a comment."""
+    return Declaration(name, kind, (about,), (0, len(entries) - 1), tuple(entries))
+
+
+class Block(NamedTuple):
+    """A function block.
+
+    Attributes:
+        name: Its name.
+        source: Remarks that say what it was written of.
+        sections: Its declarations, by the words that open them: `VAR_INPUT`.
+        body: The lines of its statements.
+    """
+
+    name: str
+    source: tuple[str, ...]
+    sections: Mapping[str, Sequence[Declaration]]
+    body: Sequence[str]
+
+    def remarks(self) -> Iterator[str]:
+        """Yield what it was written of, and its interface."""
+        yield from self.source
+        for section, word in (("VAR_INPUT", "Input"), ("VAR_OUTPUT", "Output")):
+            for one in self.sections[section]:
+                yield f"{word} {one.name} ({one.type}): {'; '.join(one.about)}"
+        yield "Nothing is kept from one call to the next."
+
+    def text(self) -> str:
+        """Return its text."""
+        lines = [f"(* {text} *)\n" for text in self.remarks()]
+        lines.append(f"FUNCTION_BLOCK {self.name}\n")
+        for opening, declarations in self.sections.items():
+            if declarations:
+                lines.append(f"{opening}\n")
+                for one in declarations:
+                    lines += one.lines()
+                lines.append("END_VAR\n")
+        return "".join([*lines, "\n", *self.body, "END_FUNCTION_BLOCK\n"])
 
 
 def known_inputs(names: Sequence[str], numbers: StNumbers) -> Iterator[str]:

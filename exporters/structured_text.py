@@ -16,13 +16,15 @@ from typing import Literal
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
+from fuzzytree.exporters.plcopen_xml import plcopen_text
 from fuzzytree.exporters.program_text import source_of, targets_of
 from fuzzytree.exporters.st_steps import RuleSteps, SystemSteps, decision
 from fuzzytree.exporters.st_text import (
     LONG,
     SINGLE,
+    Block,
+    Declaration,
     StNumbers,
-    block_of,
     identifiers,
     known_inputs,
     remark,
@@ -45,6 +47,8 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics import from_system
 
+Layout = Literal["text", "plcopen"]
+
 _OUTPUTS = ("class_number", "rule", "status", "strengths")
 _LOCALS = (
     *("is_known", "k", "level", "node", "place", "value_of_node", "axis"),
@@ -60,6 +64,7 @@ def write(
     allow_loss: bool = False,
     dtype: Literal["float64", "float32"] = "float64",
     name: str = "",
+    layout: Layout = "text",
 ) -> Written:
     """Return a model as a function block of Structured Text, in ASCII.
 
@@ -75,20 +80,23 @@ def write(
         allow_loss: Of no effect: a model is written without loss or not at all.
         dtype: LREAL (`float64`), or REAL (`float32`), which rounds all numbers.
         name: Of the function block; made from the model's unless given.
+        layout: The text of the block, or PLCopen XML (TC6, version 2.01) with the block
+            alone, which Beremiz, CODESYS and other tools import.
 
     Raises:
         LossError: If a system needs what the language has not.
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> print(write(random_tree(0)).content.decode("ascii").splitlines()[2])
-        FUNCTION_BLOCK random_7
+        >>> lines = write(random_tree(0)).content.decode("ascii").splitlines()
+        >>> [line for line in lines if line.startswith("FUNCTION_BLOCK")]
+        ['FUNCTION_BLOCK random_7']
     """
     source = source_of(write, model, locals())
     del allow_loss
     numbers = LONG if dtype == "float64" else SINGLE
     if isinstance(model, FuzzySystem):
-        return _written_system(model, numbers, name, source)
+        return _written_system(model, numbers, name, source, layout)
     mixed = [variable for variable in model.variables if variable.parts]
     combined = {variable.name: f"mix_{k}" for k, variable in enumerate(mixed, 1)}
     taken = _taken(model, combined)
@@ -101,46 +109,41 @@ def write(
         constants, local, body = _rules(model, values, numbers)
     else:
         constants, local, body = _tree(model, values, numbers)
-    lines = [
-        *_interface(model, names, numbers),
-        *block_of("VAR CONSTANT", constants),
-        *block_of(
-            "VAR",
-            [
-                *_mixed_lines(mixed, combined, numbers),
-                *(f"    {one} : {numbers.name};\n" for one in filled.values()),
-                *local,
-            ],
-        ),
-        "\n",
+    sections = {
+        "VAR_INPUT": [*_declared(model.variables, names, numbers)],
+        "VAR_OUTPUT": [*_outputs(model, numbers)],
+        "VAR CONSTANT": constants,
+        "VAR": [
+            Declaration("is_known", "BOOL"),
+            Declaration("k", "DINT"),
+            *(
+                Declaration(combined[one.name], numbers.name, (remark(one.name),))
+                for one in mixed
+            ),
+            *(Declaration(one, numbers.name) for one in filled.values()),
+            *local,
+        ],
+    }
+    statements = [
         *_fill(model, names, filled, numbers),
         *_guard(model, values, mixed, combined, numbers),
         *body,
+        "END_IF;\n",
     ]
-    return _written(model, source, (given, block), names, lines)
+    content = Block(block, _titles(model, source), sections, statements)
+    return _written(given, names, content, layout)
 
 
-def _written(
-    model: Document,
-    source: str,
-    block: tuple[str, str],
-    names: NameMap,
-    lines: Sequence[str],
-) -> Written:
+def _titles(model: Document, source: str) -> tuple[str, str]:
+    return f"Written by fuzzytree: {remark(model.name)}", f"Fingerprint: {source}"
+
+
+def _written(given: str, names: NameMap, block: Block, layout: Layout) -> Written:
     """Return a function block; its name may differ from the one it should have."""
-    given, name = block
-    text = "".join(
-        [
-            f"(* Written by fuzzytree: {remark(model.name)} *)\n",
-            f"(* Fingerprint: {source} *)\n",
-            f"FUNCTION_BLOCK {name}\n",
-            *lines,
-            "END_IF;\nEND_FUNCTION_BLOCK\n",
-        ]
-    )
+    text = block.text() if layout == "text" else plcopen_text(block)
     changed = [f"{old!r} is called {new}" for old, new in names.changed.items()]
-    if name != given:
-        changed.insert(0, f"{given!r} is called {name}")
+    if block.name != given:
+        changed.insert(0, f"{given!r} is called {block.name}")
     return Written(text.encode("ascii"), (), tuple(changed))
 
 
@@ -154,29 +157,16 @@ def _taken(model: Model, combined: Mapping[str, str]) -> list[str]:
     return [*_OUTPUTS, *_LOCALS, *combined.values(), *filled, *steps]
 
 
-def _interface(model: Model, names: NameMap, numbers: StNumbers) -> Iterator[str]:
-    inputs = [variable for variable in model.variables if not variable.parts]
-    yield from block_of("VAR_INPUT", list(_declared(inputs, names, numbers)))
-    yield "VAR_OUTPUT\n"
-    yield "    class_number : INT; (* -1: no class *)\n"
-    for place, label in enumerate(model.classes):
-        yield f"        (* {place}: {remark(label)} *)\n"
+def _outputs(model: Model, numbers: StNumbers) -> Iterator[Declaration]:
+    labels = [f"{place}: {remark(one)}" for place, one in enumerate(model.classes)]
+    yield Declaration("class_number", "INT", ("-1: no class", *labels))
     what = "rule" if isinstance(model, RuleBase) else "leaf"
-    yield f"    rule : DINT; (* number of the {what}, 0: none *)\n"
-    yield "    status : INT; (* 0: decided, 1: tie, 2: no rule fires, 3: missing *)\n"
+    yield Declaration("rule", "DINT", (f"number of the {what}, 0: none",))
+    about = "0: decided, 1: tie, 2: no rule fires, 3: missing"
+    yield Declaration("status", "INT", (about,))
     if isinstance(model, RuleBase):
-        yield f"    strengths : ARRAY [1..{len(model.rules)}] OF {numbers.name};\n"
-    yield "END_VAR\n"
-
-
-def _mixed_lines(
-    mixed: list[Variable], combined: Mapping[str, str], numbers: StNumbers
-) -> Iterator[str]:
-    yield "    is_known : BOOL;\n"
-    yield "    k : DINT;\n"
-    for variable in mixed:
-        about = remark(variable.name)
-        yield f"    {combined[variable.name]} : {numbers.name}; (* {about} *)\n"
+        about, bounds = "firing strength of each rule", (1, len(model.rules))
+        yield Declaration("strengths", numbers.name, (about,), bounds)
 
 
 def _fill(
@@ -225,8 +215,8 @@ def _guard(
     yield "ELSE\n"
 
 
-Parts = tuple[list[str], list[str], list[str]]
-"""Lines of constants, of variables, and of statements."""
+Parts = tuple[list[Declaration], list[Declaration], list[str]]
+"""Constants, variables, and lines of statements."""
 
 
 def _rules(rules: RuleBase, values: Mapping[str, str], numbers: StNumbers) -> Parts:
@@ -234,14 +224,13 @@ def _rules(rules: RuleBase, values: Mapping[str, str], numbers: StNumbers) -> Pa
     body = [*steps.statements(), *decision(rules, numbers)]
     labels = [str(rules.classes.index(rule.then)) for rule in rules.rules]
     about = "places of the rules' classes"
-    constants = [*table("rule_class", "INT", labels, about), *steps.tables]
-    local = [f"    {name} : {kind};\n" for name, kind in steps.declared.items()]
-    return constants, local, body
+    constants = [table("rule_class", "INT", labels, about), *steps.tables]
+    return constants, [*steps.declared.values()], body
 
 
 def _tree(tree: FuzzyTree, values: Mapping[str, str], numbers: StNumbers) -> Parts:
     labels = [str(tree.classes.index(leaf.label)) for leaf in tree.leaves]
-    constants = [*table("leaf_class", "INT", labels, "places of the leaves' classes")]
+    constants = [table("leaf_class", "INT", labels, "places of the leaves' classes")]
     if not tree.nodes:
         body = ["    rule := 1;\n    status := 0;\n"]
         return constants, [], [*body, "    class_number := leaf_class[0];\n"]
@@ -259,16 +248,16 @@ def _tree(tree: FuzzyTree, values: Mapping[str, str], numbers: StNumbers) -> Par
         cuts.append("0.0")  # so that a cut and the target below it share a place
     axes = [str(line[node.variable]) for node in tree.nodes]
     constants += [
-        *table("node_axis", "INT", axes, "which value each node tests"),
-        *table("node_first", "DINT", firsts, "place of its first cut"),
-        *table("node_last", "DINT", lasts, "place of its last cut"),
-        *table("cut", numbers.name, cuts, "0.0 ends the cuts of a node"),
-        *table("target", "DINT", targets, "below each cut: a node, or -1 for leaf 1"),
+        table("node_axis", "INT", axes, "which value each node tests"),
+        table("node_first", "DINT", firsts, "place of its first cut"),
+        table("node_last", "DINT", lasts, "place of its last cut"),
+        table("cut", numbers.name, cuts, "0.0 ends the cuts of a node"),
+        table("target", "DINT", targets, "below each cut: a node, or -1 for leaf 1"),
     ]
     local = [
-        "    node : DINT;\n    place : DINT;\n    level : DINT;\n",
-        f"    value_of_node : {numbers.name};\n",
-        f"    axis : ARRAY [0..{len(variables) - 1}] OF {numbers.name};\n",
+        *(Declaration(one, "DINT") for one in ("node", "place", "level")),
+        Declaration("value_of_node", numbers.name),
+        Declaration("axis", numbers.name, bounds=(0, len(variables) - 1)),
     ]
     given = [f"    axis[{line[name]}] := {values[name]};\n" for name in variables]
     return constants, local, [*given, *_walk(_depth(tree))]
@@ -303,7 +292,7 @@ _FIXED = ("is_number", "status", "is_known", "k", "halves")
 
 
 def _written_system(
-    system: FuzzySystem, numbers: StNumbers, name: str, source: str
+    system: FuzzySystem, numbers: StNumbers, name: str, source: str, layout: Layout
 ) -> Written:
     """Return a system as a function block, in ASCII.
 
@@ -330,20 +319,36 @@ def _written_system(
         f"    is_number[{number}] := FALSE;\n"
         for number, output in enumerate(system.outputs, 1)
     ]
-    local = ["    is_known : BOOL;\n    k : DINT;\n"]
-    local += [f"    {one} : {kind};\n" for one, kind in steps.declared.items()]
-    lines = [
-        *_system_interface(system, names, numbers),
-        *block_of("VAR CONSTANT", steps.tables),
-        *block_of("VAR", local),
-        "\n",
+    status = "0: decided, 2: an output has no number of its own, 3: missing"
+    sections = {
+        "VAR_INPUT": [*_declared(system.variables, names, numbers)],
+        "VAR_OUTPUT": [
+            *_declared(system.outputs, names, numbers),
+            Declaration(
+                "is_number",
+                "BOOL",
+                ("whether each output has a number",),
+                (1, len(system.outputs)),
+            ),
+            Declaration("status", "INT", (status,)),
+        ],
+        "VAR CONSTANT": steps.tables,
+        "VAR": [
+            Declaration("is_known", "BOOL"),
+            Declaration("k", "DINT"),
+            *steps.declared.values(),
+        ],
+    }
+    statements = [
         *known_inputs(inputs, numbers),
         "IF NOT is_known THEN\n    status := 3;\n",
         *nothing,
         "ELSE\n",
         *body,
+        "END_IF;\n",
     ]
-    written = _written(system, source, (given, block), names, lines)
+    content = Block(block, _titles(system, source), sections, statements)
+    written = _written(given, names, content, layout)
     note = "an output without a number is 0 and its `is_number` is FALSE"
     return replace(written, remarks=(*written.remarks, note))
 
@@ -358,26 +363,16 @@ def _formulas(system: FuzzySystem) -> Iterator[str]:
                     yield f"a division or a power ({label.name!r} of {variable.name!r})"
 
 
-def _system_interface(
-    system: FuzzySystem, names: NameMap, numbers: StNumbers
-) -> Iterator[str]:
-    columns = [one for one in system.variables if not one.parts]
-    yield from block_of("VAR_INPUT", list(_declared(columns, names, numbers)))
-    yield "VAR_OUTPUT\n"
-    yield from _declared(system.outputs, names, numbers)
-    yield f"    is_number : ARRAY [1..{len(system.outputs)}] OF BOOL;\n"
-    yield "    status : INT; (* 0: decided, 2: an output has no number of its own, "
-    yield "3: missing *)\nEND_VAR\n"
-
-
 def _declared(
     variables: Sequence[Variable | SystemOutput],
     names: NameMap,
     numbers: StNumbers,
-) -> Iterator[str]:
+) -> Iterator[Declaration]:
+    """Yield the declarations of inputs or outputs; a combination is neither."""
     for one in variables:
-        about = f"{one.name} ({one.unit})" if one.unit else one.name
-        yield f"    {names[one.name]} : {numbers.name}; (* {remark(about)} *)\n"
+        if isinstance(one, SystemOutput) or not one.parts:
+            about = f"{one.name} ({one.unit})" if one.unit else one.name
+            yield Declaration(names[one.name], numbers.name, (remark(about),))
 
 
 def _results(system: FuzzySystem, steps: SystemSteps, names: NameMap) -> Iterator[str]:

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-_ESCAPES = {
-    "&": "&amp;",
-    "<": "&lt;",
-    ">": "&gt;",
-    '"': "&quot;",
-    "\t": "&#9;",
-    "\n": "&#10;",
-    "\r": "&#13;",
-}
+_ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", "\r": "&#13;"}
+_IN_ATTRIBUTES = {**_ESCAPES, '"': "&quot;", "\t": "&#9;", "\n": "&#10;"}
 _DEEPEST = 20  # levels that are indented further than the one above
 
 
@@ -58,17 +51,19 @@ def _lines(root: XmlElement) -> Iterator[str]:
             yield f"{indent}</{one}>"
             continue
         attributes = "".join(
-            f' {name}="{_escaped(text)}"' for name, text in one.attributes.items()
+            f' {name}="{_escaped(text, _IN_ATTRIBUTES)}"'
+            for name, text in one.attributes.items()
         )
         if one.children:
             yield f"{indent}<{one.tag}{attributes}>"
             todo.append((depth, one.tag))
             todo += [(depth + 1, child) for child in reversed(one.children)]
         elif one.text:
-            yield f"{indent}<{one.tag}{attributes}>{_escaped(one.text)}</{one.tag}>"
+            text = _escaped(one.text, _ESCAPES)
+            yield f"{indent}<{one.tag}{attributes}>{text}</{one.tag}>"
         else:
             yield f"{indent}<{one.tag}{attributes}/>"
 
 
-def _escaped(text: str) -> str:
-    return "".join(_ESCAPES.get(character, character) for character in text)
+def _escaped(text: str, escapes: Mapping[str, str]) -> str:
+    return "".join(escapes.get(character, character) for character in text)

@@ -49,6 +49,12 @@ def test_a_small_rule_base_as_one_reads_it() -> None:
         == f"""\
 (* Written by fuzzytree: grip *)
 (* Fingerprint: {fingerprint(grip())} *)
+(* Input grip_force (LREAL): grip force (N) *)
+(* Output class_number (INT): -1: no class; 0: soft; 1: hard *)
+(* Output rule (DINT): number of the rule, 0: none *)
+(* Output status (INT): 0: decided, 1: tie, 2: no rule fires, 3: missing *)
+(* Output strengths (ARRAY [1..2] OF LREAL): firing strength of each rule *)
+(* Nothing is kept from one call to the next. *)
 FUNCTION_BLOCK grip
 VAR_INPUT
     grip_force : LREAL; (* grip force (N) *)
@@ -59,7 +65,7 @@ VAR_OUTPUT
         (* 1: hard *)
     rule : DINT; (* number of the rule, 0: none *)
     status : INT; (* 0: decided, 1: tie, 2: no rule fires, 3: missing *)
-    strengths : ARRAY [1..2] OF LREAL;
+    strengths : ARRAY [1..2] OF LREAL; (* firing strength of each rule *)
 END_VAR
 VAR CONSTANT
     rule_class : ARRAY [0..1] OF INT := [ (* places of the rules' classes *)
@@ -185,6 +191,62 @@ def test_a_name_can_be_given_to_the_function_block() -> None:
     assert write(grip(), name="IF").remarks[0] == "'IF' is called IF_2"
 
 
+def test_a_project_of_plcopen_holds_one_block_as_one_reads_it() -> None:
+    constant = RuleBase("on", ("x]]>",), (), (Rule((), "x]]>"),))
+    text = write(constant, layout="plcopen").content.decode("ascii")
+    start = text.index('      <pou name="on')
+    # What follows the inputs and outputs is compared with the block's own text.
+    shown = text[start : text.index("          <localVars")]
+    assert (
+        shown
+        == """\
+      <pou name="on_2" pouType="functionBlock">
+        <interface>
+          <outputVars>
+            <variable name="class_number">
+              <type>
+                <INT/>
+              </type>
+              <documentation>
+                <xhtml:p>-1: no class
+0: x]]&gt;</xhtml:p>
+              </documentation>
+            </variable>
+            <variable name="rule">
+              <type>
+                <DINT/>
+              </type>
+              <documentation>
+                <xhtml:p>number of the rule, 0: none</xhtml:p>
+              </documentation>
+            </variable>
+            <variable name="status">
+              <type>
+                <INT/>
+              </type>
+              <documentation>
+                <xhtml:p>0: decided, 1: tie, 2: no rule fires, 3: missing</xhtml:p>
+              </documentation>
+            </variable>
+            <variable name="strengths">
+              <type>
+                <array>
+                  <dimension lower="1" upper="1"/>
+                  <baseType>
+                    <LREAL/>
+                  </baseType>
+                </array>
+              </type>
+              <documentation>
+                <xhtml:p>firing strength of each rule</xhtml:p>
+              </documentation>
+            </variable>
+          </outputVars>
+"""
+    )
+    assert f"Fingerprint: {fingerprint(constant)} Options: layout=plcopen\n" in text
+
+
 def test_nothing_is_lost_and_the_same_model_gives_the_same_bytes() -> None:
     rules = rules_from_tree(random_tree(3))
     assert write(rules).losses == ()
@@ -200,7 +262,7 @@ def test_a_system_has_its_outputs_and_reports_whether_they_are_numbers() -> None
     assert outputs == (
         "VAR_OUTPUT\n"
         "    fan : LREAL; (* fan *)\n"
-        "    is_number : ARRAY [1..1] OF BOOL;\n"
+        "    is_number : ARRAY [1..1] OF BOOL; (* whether each output has a number *)\n"
         "    status : INT; (* 0: decided, 2: an output has no number of its own, "
         "3: missing *)\n"
         "END_VAR"
