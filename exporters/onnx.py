@@ -129,9 +129,10 @@ def write_onnx(
         outputs: Which outputs, in this order: unless given, `label` and `rule`, of a
             system `outputs` and `status`.
         readable: Whether each operation is a node, named after what it computes, such
-            as `grip_is_firm` or `rule_1_strength`, for people who look into the file
-            (rules only).
-        plain: Whether a tree does without the operators of ai.onnx.ml.
+            as `grip_is_firm` or `rule_1_strength`, for people who look into the file.
+            A tree's is not, a fuzzy system's always is.
+        plain: Whether a tree does without the operators of ai.onnx.ml, as rules and
+            systems always do.
         verify: Whether to load the file in onnxruntime and to compare its predictions.
 
     Returns:
@@ -156,7 +157,8 @@ def write_onnx(
     outputs = usual if outputs is None else outputs
     _check_options(model, dtype, opset, ir, signature, outputs)
     columns = _columns(model, signature, columns)
-    _check_variants(model, readable=readable, plain=plain)
+    if readable and _is_tree(model):
+        raise ValueError("readable is for rules: a tree's graph has no rules")
     require("onnx", "writing onnx needs")
     if verify:
         require("onnxruntime", "verifying a written onnx file needs")
@@ -211,15 +213,6 @@ def _check_options(
             f"{model.name!r} does not know the columns of its training table, "
             "so its signature can only be 'needed'"
         )
-
-
-def _check_variants(model: Model | FuzzySystem, *, readable: bool, plain: bool) -> None:
-    if readable and isinstance(model, FuzzySystem):
-        raise ValueError("readable is for rules: a system's graph always is")
-    if plain and not _is_tree(model):
-        raise ValueError("plain is for trees: rules never need ai.onnx.ml")
-    if readable and _is_tree(model):
-        raise ValueError("readable is for rules: a tree's graph has no rules")
 
 
 def check_outputs(

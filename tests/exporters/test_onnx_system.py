@@ -153,11 +153,6 @@ def test_a_file_without_outputs_cannot_be_run() -> None:
         ({"outputs": ("label",)}, "outputs: there is outputs, status, activations, "),
         ({"dtype": "float32"}, "dtype: there is float64, not 'float32'"),
         ({"signature": "all"}, "signature: there is needed, not 'all'"),
-        (
-            {"readable": True},
-            "readable is for rules: a system's graph always is",
-        ),
-        ({"plain": True}, "plain is for trees"),
     ],
 )
 def test_options_of_trees_and_rules_are_refused(
@@ -165,6 +160,11 @@ def test_options_of_trees_and_rules_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=text):
         write_onnx(SYSTEM, **options)  # type: ignore[arg-type] # wrong on purpose
+
+
+def test_a_graph_is_readable_and_plain_as_it_is() -> None:
+    content = write_onnx(SYSTEM).content
+    assert write_onnx(SYSTEM, readable=True, plain=True).content == content
 
 
 def test_a_system_s_outputs_are_no_model_s() -> None:
