@@ -10,7 +10,7 @@ value.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
 from msgspec.structs import replace
@@ -109,33 +109,47 @@ def write(
         constants, local, body = _rules(model, values, numbers)
     else:
         constants, local, body = _tree(model, values, numbers)
-    sections = {
-        "VAR_INPUT": [*_declared(model.variables, names, numbers)],
-        "VAR_OUTPUT": [*_outputs(model, numbers)],
-        "VAR CONSTANT": constants,
-        "VAR": [
-            Declaration("is_known", "BOOL"),
-            Declaration("k", "DINT"),
-            *(
-                Declaration(combined[one.name], numbers.name, (remark(one.name),))
-                for one in mixed
-            ),
-            *(Declaration(one, numbers.name) for one in filled.values()),
-            *local,
-        ],
-    }
-    statements = [
+    local = [
+        *(
+            Declaration(combined[v.name], numbers.name, (remark(v.name),))
+            for v in mixed
+        ),
+        *(Declaration(name, numbers.name) for name in filled.values()),
+        *local,
+    ]
+    body = [
         *_fill(model, names, filled, numbers),
         *_guard(model, values, mixed, combined, numbers),
         *body,
-        "END_IF;\n",
     ]
-    content = Block(block, _titles(model, source), sections, statements)
+    parts, outputs = (constants, local, body), _outputs(model, numbers)
+    content = _block(model, block, source, numbers, names, outputs, parts)
     return _written(given, names, content, layout)
 
 
-def _titles(model: Document, source: str) -> tuple[str, str]:
-    return f"Written by fuzzytree: {remark(model.name)}", f"Fingerprint: {source}"
+Parts = tuple[list[Declaration], list[Declaration], list[str]]
+"""Constants, variables, and lines of statements."""
+
+
+def _block(
+    model: Document,
+    name: str,
+    source: str,
+    numbers: StNumbers,
+    names: NameMap,
+    outputs: Iterable[Declaration],
+    parts: Parts,
+) -> Block:
+    """Return a block with the inputs and the variables that every one has."""
+    constants, local, body = parts
+    sections = {
+        "VAR_INPUT": [*_declared(model.variables, names, numbers)],
+        "VAR_OUTPUT": [*outputs],
+        "VAR CONSTANT": constants,
+        "VAR": [Declaration("is_known", "BOOL"), Declaration("k", "DINT"), *local],
+    }
+    about = f"Written by fuzzytree: {remark(model.name)}", f"Fingerprint: {source}"
+    return Block(name, about, sections, [*body, "END_IF;\n"])
 
 
 def _written(given: str, names: NameMap, block: Block, layout: Layout) -> Written:
@@ -213,10 +227,6 @@ def _guard(
         yield f"    FOR k := 1 TO {len(model.rules)} DO\n"
         yield f"        strengths[k] := {zero};\n    END_FOR;\n"
     yield "ELSE\n"
-
-
-Parts = tuple[list[Declaration], list[Declaration], list[str]]
-"""Constants, variables, and lines of statements."""
 
 
 def _rules(rules: RuleBase, values: Mapping[str, str], numbers: StNumbers) -> Parts:
@@ -319,35 +329,22 @@ def _written_system(
         f"    is_number[{number}] := FALSE;\n"
         for number, output in enumerate(system.outputs, 1)
     ]
+    about, bounds = "whether each output has a number", (1, len(system.outputs))
     status = "0: decided, 2: an output has no number of its own, 3: missing"
-    sections = {
-        "VAR_INPUT": [*_declared(system.variables, names, numbers)],
-        "VAR_OUTPUT": [
-            *_declared(system.outputs, names, numbers),
-            Declaration(
-                "is_number",
-                "BOOL",
-                ("whether each output has a number",),
-                (1, len(system.outputs)),
-            ),
-            Declaration("status", "INT", (status,)),
-        ],
-        "VAR CONSTANT": steps.tables,
-        "VAR": [
-            Declaration("is_known", "BOOL"),
-            Declaration("k", "DINT"),
-            *steps.declared.values(),
-        ],
-    }
-    statements = [
+    outputs = [
+        *_declared(system.outputs, names, numbers),
+        Declaration("is_number", "BOOL", (about,), bounds),
+        Declaration("status", "INT", (status,)),
+    ]
+    body = [
         *known_inputs(inputs, numbers),
         "IF NOT is_known THEN\n    status := 3;\n",
         *nothing,
         "ELSE\n",
         *body,
-        "END_IF;\n",
     ]
-    content = Block(block, _titles(system, source), sections, statements)
+    parts = steps.tables, [*steps.declared.values()], body
+    content = _block(system, block, source, numbers, names, outputs, parts)
     written = _written(given, names, content, layout)
     note = "an output without a number is 0 and its `is_number` is FALSE"
     return replace(written, remarks=(*written.remarks, note))
