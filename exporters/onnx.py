@@ -122,8 +122,8 @@ def write_onnx(
         opset: The version of the operators, 12 to 26.
         ir: The version of the file, 4 to 13.
         signature: `needed` for the model's inputs as columns, `all` for all columns
-            of the training table, of which the others are ignored; so for a model that
-            needs none. Rows of any width are taken if it knows no columns either.
+            of the training table, of which the others are ignored. A model that needs
+            no column takes rows of any width.
         columns: The columns of the rows that the graph will get, in their order, the
             model's inputs among them; `signature` says which unless given.
         outputs: Which outputs, in this order: unless given, `label` and `rule`, of a
@@ -261,11 +261,8 @@ def _columns(
             needed = f"; the model also needs {', '.join(lacking)}" if lacking else ""
             raise ValueError(f"columns: name each once, not {tuple(columns)!r}{needed}")
         return tuple(columns)
-    if not isinstance(model, FuzzySystem) and (
-        signature == "all" or not model.inputs  # rows of no column cannot be given
-    ):
-        return model.columns
-    return model.inputs
+    is_whole = signature == "all" and not isinstance(model, FuzzySystem)
+    return model.columns if is_whole else model.inputs
 
 
 def _model_proto(

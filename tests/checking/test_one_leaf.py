@@ -10,7 +10,7 @@ import onnxruntime
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.exporters.onnx import write_onnx
+from fuzzytree.exporters.onnx import Output, write_onnx
 from fuzzytree.model.tree import FuzzyTree, Leaf
 from fuzzytree.semantics.lowering import rules_from_tree
 
@@ -53,12 +53,15 @@ def test_a_tree_of_one_leaf_is_stable_on_rows() -> None:
 
 
 @pytest.mark.parametrize("model", [TREE, rules_from_tree(TREE)], ids=["tree", "rules"])
+@pytest.mark.parametrize("signature", ["needed", "all"])
 def test_the_graph_of_a_model_without_inputs_takes_the_columns_of_its_table(
-    model: Any,
+    model: Any, signature: Any
 ) -> None:
-    content = write_onnx(model, outputs=("label", "rule", "status")).content
+    outputs: tuple[Output, ...] = ("label", "rule", "status")
+    content = write_onnx(model, outputs=outputs, signature=signature).content
     session = onnxruntime.InferenceSession(content)
-    assert session.get_inputs()[0].shape == ["rows", 2]
+    width = "columns" if signature == "needed" else 2
+    assert session.get_inputs()[0].shape == ["rows", width]
     rows = np.array([[1.0, np.nan], [np.inf, 2.0], [3.0, 4.0]])
     label, rule, status = session.run(None, {"inputs": rows})
     assert (list(label), list(rule), list(status)) == (["x"] * 3, [1] * 3, [0] * 3)
