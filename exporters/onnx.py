@@ -30,7 +30,7 @@ from fuzzytree.model import (
     stand_ins,
     text_fault,
 )
-from fuzzytree.semantics import from_rules, from_system
+from fuzzytree.semantics import program_of
 
 if TYPE_CHECKING:
     import onnx
@@ -130,7 +130,7 @@ def write_onnx(
             system `outputs` and `status`.
         readable: Whether each operation is a node, named after what it computes, such
             as `grip_is_firm` or `rule_1_strength`, for people who look into the file.
-            A tree's is not, a fuzzy system's always is.
+            A fuzzy system's always is.
         plain: Whether a tree does without the operators of ai.onnx.ml, as rules and
             systems always do.
         verify: Whether to load the file in onnxruntime and to compare its predictions.
@@ -157,8 +157,6 @@ def write_onnx(
     outputs = usual if outputs is None else outputs
     _check_options(model, dtype, opset, ir, signature, outputs)
     columns = _columns(model, signature, columns)
-    if readable and _is_tree(model):
-        raise ValueError("readable is for rules: a tree's graph has no rules")
     require("onnx", "writing onnx needs")
     if verify:
         require("onnxruntime", "verifying a written onnx file needs")
@@ -302,23 +300,24 @@ def _model_proto(
     if "probabilities" in outputs and not isinstance(model, FuzzySystem):
         kinds["probabilities"] = TensorProto.DOUBLE, ["rows", len(model.classes)]
     facts = _facts(model, dtype, columns, outputs)
-    if isinstance(model, FuzzySystem):
-        kinds["outputs"] = (degree, ["rows", len(model.outputs)])
-        program = from_system(model, activations="activations" in outputs)
-        program_graph(graph, program, columns, outputs)
-        facts["chunk"] = str(rows_at_once(model, program))
-    else:
-        if readable:
-            facts["form"] = "readable"
+    if readable or isinstance(model, FuzzySystem):
+        program = program_of(
+            model,
+            with_strengths="activations" in outputs,
+            with_probabilities="probabilities" in outputs,
+        )
+        program_graph(graph, program, columns, outputs, model.classes)
+        if isinstance(model, FuzzySystem):
+            kinds["outputs"] = (degree, ["rows", len(model.outputs)])
+            facts["chunk"] = str(rows_at_once(model, program))
         else:
-            onnx_ends.fill_inputs(graph, model, columns)
+            facts["form"] = "readable"
+    else:
+        onnx_ends.fill_inputs(graph, model, columns)
         if isinstance(model, FuzzyTree):
             is_plain = plain or needs_plain(model)
             frame = tree_graph(graph, model, columns, is_plain=is_plain)
             onnx_ends.add_tree_outputs(graph, model, frame, outputs)
-        elif readable:
-            program = from_rules(model, probabilities="probabilities" in outputs)
-            program_graph(graph, program, columns, outputs, model.classes)
         else:
             frame, strengths = rules_graph(graph, model, columns)
             onnx_ends.add_rule_outputs(graph, model, frame, strengths, outputs)

@@ -48,7 +48,7 @@ class ExportOptions(WritingOptions):
         "onnx: outputs of the graph, of label,rule,status,strengths,probabilities.",
     )
     readable: bool = flag(
-        "--readable", "onnx: write a node with a name for each step of rules."
+        "--readable", "onnx: write a node with a name for each step of the model."
     )
     plain: bool = flag("--plain", "onnx: write a tree without operators of ai.onnx.ml.")
 

@@ -39,6 +39,7 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.numerics.narrowing import rounded
 from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import probes
 from fuzzytree.semantics.reference import evaluate
 from fuzzytree.testing import random_system, random_tree
 
@@ -232,6 +233,29 @@ def test_other_columns_of_a_full_signature_are_ignored() -> None:
         assert _answers(content, values)["rule"].tolist() == [1, 3, 0]
 
 
+@pytest.mark.parametrize("dtype", ["float64", "mixed", "float32"])
+def test_a_readable_tree_answers_as_the_tree_at_every_edge(dtype: Dtype) -> None:
+    outputs: tuple[Output, ...] = ("label", "rule", "status")
+    for seed in range(6):
+        tree = random_tree(seed, leaves=9, combinations=0.5)
+        values = np.array([[*row.values()] for row in probes(tree, limit=300)])
+        if dtype == "float32":
+            with np.errstate(over="ignore"):  # beyond float32 is missing in float32
+                values = values.astype(np.float32)
+        usual, readable = (
+            write_onnx(
+                tree, dtype=dtype, outputs=outputs, allow_loss=True, readable=form
+            ).content
+            for form in (False, True)
+        )
+        names = [node.name for node in onnx.load_from_string(readable).graph.node]
+        assert "node_1_below_less" in names
+        right = _answers(usual, values)
+        for name, array in _answers(readable, values).items():
+            np.testing.assert_array_equal(array, right[name])
+        assert not any(differences(readable, tree))
+
+
 @pytest.mark.parametrize("width", [0, 1, 4])
 def test_a_model_without_inputs_answers_rows_of_any_width(width: int) -> None:
     tree = FuzzyTree("one", ("a",), (), (), (Leaf("a"),))
@@ -245,11 +269,12 @@ def test_a_model_without_inputs_answers_rows_of_any_width(width: int) -> None:
     [
         (grip_tree(), {}),
         (grip_tree(), {"plain": True}),
+        (grip_tree(), {"readable": True}),
         (rules_from_tree(grip_tree()), {}),
         (rules_from_tree(grip_tree()), {"readable": True}),
         (random_system(3, formulas="none"), {"outputs": ("outputs", "status")}),
     ],
-    ids=["tree", "plain tree", "rules", "readable rules", "system"],
+    ids=["tree", "plain tree", "readable tree", "rules", "readable rules", "system"],
 )
 def test_the_columns_of_the_callers_rows_can_be_any(
     model: Document, options: dict[str, Any]
@@ -360,9 +385,6 @@ def test_wrong_options_are_refused_by_name() -> None:
     )
     assert refused(tree, ir=14) == "ir: onnx files are written for 4 to 13, not 14"
     assert write_onnx(rules, plain=True).content == write_onnx(rules).content
-    assert refused(tree, readable=True) == (
-        "readable is for rules: a tree's graph has no rules"
-    )
     assert refused(rules, columns=("a", "b", "a")) == (
         "columns: name each once, not ('a', 'b', 'a'); the model also needs "
         + ", ".join(map(repr, rules.inputs))
