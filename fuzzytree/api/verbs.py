@@ -31,7 +31,7 @@ from fuzzytree.checking import export as export
 from fuzzytree.checking import load as load
 from fuzzytree.checking import read as read
 from fuzzytree.errors import ReadError, TableError
-from fuzzytree.exporters import all_formats
+from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import check_stream, read_bounded, reason, write_atomically
 from fuzzytree.model import (
     DATE_UNIT,
@@ -404,6 +404,8 @@ def _program(source: Carried, may_run: bool) -> checking.ProgramFile | None:
     if not isinstance(source, str | os.PathLike):
         return None
     form = checking.format_of(source)
+    if form.name == "fml" and b"<project xmlns=" in read_bounded(source)[:200]:
+        form = find_format("structured-text")  # PLCopen XML has the suffix of FML
     if form.read is not None or form.name == "onnx":
         return None
 

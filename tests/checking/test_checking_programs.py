@@ -91,6 +91,7 @@ def test_a_program_of_ours_is_run_and_agrees(
         ("m.sql", {"dialect": "duckdb", "table": "t"}),
         ("m.sql", {"keep": ["x1"]}),
         ("m.st", {"name": "fb", "dtype": "float32"}),
+        ("m.xml", {"to": "structured-text", "layout": "plcopen"}),
         ("m.js", {"module": "script"}),
     ],
 )
