@@ -43,6 +43,10 @@ class ExportOptions(WritingOptions):
         "onnx: columns that are inputs of the graph.",
         choices=["needed", "all"],
     )
+    columns: str | None = option(
+        "--columns NAMES",
+        "onnx: columns of the rows that the graph will get, in order.",
+    )
     outputs: str | None = option(
         "--outputs NAMES",
         "onnx: outputs of the graph, of label,rule,status,strengths,probabilities.",
@@ -68,6 +72,7 @@ def command(options: ExportOptions) -> int:
         "opset": options.opset,
         "ir": options.ir,
         "signature": options.signature,
+        "columns": options.columns.split(",") if options.columns else None,
         "outputs": options.outputs.split(",") if options.outputs else None,
         "readable": options.readable or None,
         "plain": options.plain or None,
