@@ -23,6 +23,7 @@ from fuzzytree.model import (
     FuzzySystem,
     FuzzyTree,
     Model,
+    RuleBase,
     Written,
     fingerprint,
     kind_of,
@@ -152,8 +153,9 @@ def write_onnx(
         >>> written.losses
         ()
     """
-    is_system = isinstance(model, FuzzySystem)
-    usual: Sequence[Output] = ("outputs", "status") if is_system else ("label", "rule")
+    usual: Sequence[Output] = ("outputs", "status")
+    if not model.outputs:
+        usual = ("label", "rule")
     outputs = usual if outputs is None else outputs
     _check_options(model, dtype, opset, ir, signature, outputs)
     columns = _columns(model, signature, columns)
@@ -162,7 +164,7 @@ def write_onnx(
         require("onnxruntime", "verifying a written onnx file needs")
     from fuzzytree.numerics import losses
 
-    lost = () if isinstance(model, FuzzySystem) else losses(model, dtype)
+    lost = losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, f"onnx {dtype}", lost)
     proto = _model_proto(
@@ -179,14 +181,10 @@ def write_onnx(
             columns,
             outputs,
             kind=NUMBERS[dtype].axis,
-            is_exact=dtype == "float64" or (dtype == "mixed" and _is_tree(model)),
+            is_exact=dtype == "float64" or (dtype == "mixed" and not model.rules),
         )
     has_trees = any(entry.domain == "ai.onnx.ml" for entry in proto.opset_import)
     return Written(content, lost, (_NO_TREES,) if has_trees else ())
-
-
-def _is_tree(model: Model | FuzzySystem) -> bool:
-    return isinstance(model, FuzzyTree)
 
 
 def _check_options(
@@ -197,7 +195,7 @@ def _check_options(
     signature: Signature,
     outputs: Sequence[Output],
 ) -> None:
-    is_system = isinstance(model, FuzzySystem)
+    is_system = bool(model.outputs)
     for name, value, choices in (
         ("dtype", dtype, ("float64",) if is_system else get_args(Dtype)),
         ("signature", signature, ("needed",) if is_system else get_args(Signature)),
@@ -206,7 +204,7 @@ def _check_options(
             raise ValueError(f"{name}: there is {', '.join(choices)}, not {value!r}")
     check_outputs(model, outputs, _OF_SYSTEMS if is_system else _OF_MODELS)
     check_versions(opset, ir)
-    if signature == "all" and not (isinstance(model, FuzzySystem) or model.columns):
+    if signature == "all" and not model.columns:
         raise ValueError(
             f"{model.name!r} does not know the columns of its training table, "
             "so its signature can only be 'needed'"
@@ -222,7 +220,7 @@ def check_outputs(
             raise ValueError(f"outputs: there is {', '.join(known)}, not {name!r}")
     if not outputs or len(set(outputs)) != len(outputs):
         raise ValueError(f"outputs: name each once, at least one, not {outputs!r}")
-    if "strengths" in outputs and _is_tree(model):
+    if "strengths" in outputs and not model.rules:
         raise ValueError(
             "outputs: a tree has no strengths; write its rules to have them"
         )
@@ -259,8 +257,7 @@ def _columns(
             needed = f"; the model also needs {', '.join(lacking)}" if lacking else ""
             raise ValueError(f"columns: name each once, not {tuple(columns)!r}{needed}")
         return tuple(columns)
-    is_whole = signature == "all" and not isinstance(model, FuzzySystem)
-    return model.columns if is_whole else model.inputs
+    return model.columns if signature == "all" else model.inputs
 
 
 def _model_proto(
@@ -289,16 +286,16 @@ def _model_proto(
 
     numbers = NUMBERS[dtype]
     graph = OnnxGraph(opset, numbers)
-    degree, rules = np_to_onnx(numbers.degree), _rule_count(model)
+    degree, rules = np_to_onnx(numbers.degree), len(model.rules)
     kinds: dict[Output, tuple[int, list[str | int]]] = {
         "label": (TensorProto.STRING, ["rows"]),
         "rule": (TensorProto.INT64, ["rows"]),
         "status": (TensorProto.INT64, ["rows"]),
         "strengths": (degree, ["rows", rules]),
         "activations": (degree, ["rows", rules]),
+        "probabilities": (TensorProto.DOUBLE, ["rows", len(model.classes)]),
+        "outputs": (degree, ["rows", len(model.outputs)]),
     }
-    if "probabilities" in outputs and not isinstance(model, FuzzySystem):
-        kinds["probabilities"] = TensorProto.DOUBLE, ["rows", len(model.classes)]
     facts = _facts(model, dtype, columns, outputs)
     if readable or isinstance(model, FuzzySystem):
         program = program_of(
@@ -308,7 +305,6 @@ def _model_proto(
         )
         program_graph(graph, program, columns, outputs, model.classes)
         if isinstance(model, FuzzySystem):
-            kinds["outputs"] = (degree, ["rows", len(model.outputs)])
             facts["chunk"] = str(rows_at_once(model, program))
         else:
             facts["form"] = "readable"
@@ -332,10 +328,6 @@ def _model_proto(
     )
 
 
-def _rule_count(model: Model | FuzzySystem) -> int:
-    return len(model.leaves if isinstance(model, FuzzyTree) else model.rules)
-
-
 def _facts(
     model: Model | FuzzySystem,
     dtype: Dtype,
@@ -344,21 +336,22 @@ def _facts(
 ) -> dict[str, str]:
     """Return the metadata: plain words where possible, JSON for lists and records."""
     kind: str = kind_of(model)
-    classes, semantics = tuple[str, ...](), {}
-    names: dict[str, object] = {}
-    if isinstance(model, FuzzySystem):
-        names["names"] = [one.name for one in model.outputs]
-    else:
-        classes = model.classes
-        semantics = msgspec.to_builtins(model.semantics)
-        kind = "descent" if isinstance(model, FuzzyTree) else model.kind or kind
+    semantics, names = {}, {}
+    match model:
+        case FuzzySystem():
+            names = {"names": [output.name for output in model.outputs]}
+        case FuzzyTree():
+            kind, semantics = "descent", msgspec.to_builtins(model.semantics)
+        case RuleBase():
+            kind = model.kind or kind
+            semantics = msgspec.to_builtins(model.semantics)
     units = {one.name: one.unit for one in model.variables if one.name in columns}
     records: dict[str, object] = {
         "columns": list(columns),
         "inputs": list(model.inputs),
         "units": [units.get(name, "") for name in columns],
-        "classes": list(classes),
-        "rules": _rule_count(model),
+        "classes": list(model.classes),
+        "rules": len(model.rule_labels) or len(model.rules),
         "outputs": list(outputs),
         "semantics": semantics,
         **names,
@@ -390,29 +383,32 @@ def facts_of(
 
 
 def _in_words(model: Model | FuzzySystem, dtype: Dtype) -> str:
-    if isinstance(model, FuzzySystem):
-        numbers = ", ".join(repr(one.name) for one in model.outputs)
-        return (
-            f"The fuzzy system {model.name!r} with {len(model.rules)} rules: it "
-            f"computes {numbers}. Missing and infinite values give NaN. "
-            f"Numbers: {dtype}."
-        )
-    missing = model.semantics.missing
-    answer = "no class" if missing is None else repr(missing)
-    if isinstance(model, FuzzyTree):
-        what = (
-            f"The fuzzy decision tree {model.name!r} with {len(model.leaves)} leaves: "
-            "one path is followed, a value equal to a cut goes to the left."
-        )
-    else:
-        uncovered = model.semantics.uncovered
-        other = "no class" if uncovered is None else repr(uncovered)
-        what = (
-            f"The fuzzy rule base {model.name!r} with {len(model.rules)} rules: AND is "
-            f"{model.semantics.conjunction}, the first of the strongest rules decides, "
-            f"and where none fires the answer is {other}."
-        )
+    match model:
+        case FuzzySystem():
+            answer, numbers = "NaN", ", ".join(repr(one.name) for one in model.outputs)
+            what = (
+                f"The fuzzy system {model.name!r} with {len(model.rules)} rules: it "
+                f"computes {numbers}."
+            )
+        case FuzzyTree():
+            answer = _answer(model.semantics.missing)
+            what = (
+                f"The fuzzy decision tree {model.name!r} with {len(model.leaves)} "
+                "leaves: one path is followed, a value equal to a cut goes to the left."
+            )
+        case RuleBase():
+            answer = _answer(model.semantics.missing)
+            what = (
+                f"The fuzzy rule base {model.name!r} with {len(model.rules)} rules: AND"
+                f" is {model.semantics.conjunction}, the first of the strongest rules "
+                "decides, and where none fires the answer is "
+                f"{_answer(model.semantics.uncovered)}."
+            )
     return f"{what} Missing and infinite values give {answer}. Numbers: {dtype}."
+
+
+def _answer(label: str | None) -> str:
+    return "no class" if label is None else repr(label)
 
 
 def version() -> str:

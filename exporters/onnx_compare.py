@@ -17,7 +17,7 @@ import msgspec
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.exporters.onnx_graph import TREES
-from fuzzytree.model import FuzzySystem, FuzzyTree, Model, Written, fingerprint
+from fuzzytree.model import FuzzySystem, Model, Written, fingerprint
 
 if TYPE_CHECKING:
     import onnx
@@ -80,7 +80,7 @@ def differences(
             outputs=[entry.name for entry in result.graph.output],
             opset=versions.get("", 0),
             ir=result.ir_version,
-            plain=isinstance(model, FuzzyTree) and TREES not in versions,
+            plain=not model.rules and TREES not in versions,
             **options,
         )
     except (ValueError, LossError) as error:  # it states what is not written now

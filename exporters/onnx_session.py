@@ -106,8 +106,7 @@ def prove(
         values = np.array(table, np.float64).astype(kind)
     values = values.reshape(len(rows), len(columns))
     result = _run(content, model.name, names, values)
-    is_system = isinstance(model, FuzzySystem)
-    known = {} if is_system else stand_ins(model.variables)
+    known = stand_ins(model.variables)
     every = zip(rows, _expected(model, rows), strict=True)
     for number, (row, (expected, allowed)) in enumerate(every):
         if not is_exact and all(
@@ -148,9 +147,7 @@ def _rows(model: Document) -> Sequence[Row]:
         size = from_system(model, activations=True).size
         limit = min(_MOST_ROWS, _MOST_OPERATIONS // size)
         return system_probes(model, limit=max(1, limit))
-    size = 1
-    if isinstance(model, RuleBase):
-        size = 6 * sum(len(c.terms) for rule in model.rules for c in rule.when) or 1
+    size = 6 * sum(len(c.terms) for rule in model.rules for c in rule.when) or 1
     limit = min(_MOST_ROWS, _MOST_OPERATIONS // size)
     rows = few_probes(model, max(1, limit))
     return [*rows, dict.fromkeys(model.inputs, math.nan)]

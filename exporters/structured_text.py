@@ -163,9 +163,11 @@ def _written(given: str, names: NameMap, block: Block, layout: Layout) -> Writte
 
 def _taken(model: Model, combined: Mapping[str, str]) -> list[str]:
     """Return the names that neither an input nor the function block may have."""
-    count = 0
-    if isinstance(model, RuleBase):
-        count = len(RuleSteps(model, {}, LONG).program.steps)
+    count = (
+        len(RuleSteps(model, {}, LONG).program.steps)
+        if isinstance(model, RuleBase)
+        else 0
+    )
     steps = [f"{letter}{k}" for letter in "vbnt" for k in range(count)]
     filled = [f"in_{k}" for k, _ in enumerate(stand_ins(model.variables), 1)]
     return [*_OUTPUTS, *_LOCALS, *combined.values(), *filled, *steps]
@@ -174,11 +176,11 @@ def _taken(model: Model, combined: Mapping[str, str]) -> list[str]:
 def _outputs(model: Model, numbers: StNumbers) -> Iterator[Declaration]:
     labels = [f"{place}: {remark(one)}" for place, one in enumerate(model.classes)]
     yield Declaration("class_number", "INT", ("-1: no class", *labels))
-    what = "rule" if isinstance(model, RuleBase) else "leaf"
+    what = "rule" if model.rules else "leaf"
     yield Declaration("rule", "DINT", (f"number of the {what}, 0: none",))
     about = "0: decided, 1: tie, 2: no rule fires, 3: missing"
     yield Declaration("status", "INT", (about,))
-    if isinstance(model, RuleBase):
+    if model.rules:
         about, bounds = "firing strength of each rule", (1, len(model.rules))
         yield Declaration("strengths", numbers.name, (about,), bounds)
 
@@ -222,7 +224,7 @@ def _guard(
     label = -1 if missing is None else model.classes.index(missing)
     yield "IF NOT is_known THEN\n"
     yield f"    class_number := {label};\n    rule := 0;\n    status := 3;\n"
-    if isinstance(model, RuleBase):
+    if model.rules:
         zero = numbers.literal(0.0)
         yield f"    FOR k := 1 TO {len(model.rules)} DO\n"
         yield f"        strengths[k] := {zero};\n    END_FOR;\n"
