@@ -474,7 +474,7 @@ def _class(text: str) -> str | None:
 
 
 def _places(items: Any) -> list[Place]:
-    """Return the places of a list that has a line for each item."""
+    """Return the places of the items of a list."""
     return items.places if isinstance(items, Items) else []
 
 

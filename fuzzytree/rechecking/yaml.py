@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_right
+from operator import itemgetter
 from typing import Any, NamedTuple, NoReturn
 
 from fuzzytree.rechecking.outcomes import CannotRunError
@@ -33,7 +35,7 @@ _FORBIDDEN = re.compile(
 
 
 class Items(list[Any]):
-    """A list with a line for each item, and the lines and columns of these."""
+    """A list, and the line and the column of each item."""
 
     def __init__(self) -> None:
         self.places: list[tuple[int, int]] = []
@@ -150,16 +152,25 @@ class _Reader:
 
     def _value(self, text: str, indent: int) -> Any:
         """Return a text, number, or list or mapping in brackets, over several lines."""
-        parts = [text]
+        first = self.lines[self.at]
+        column = first.indent + len(first.text) - len(text) + 1
+        parts, starts = [text], [(0, first.number, column)]
+        end, depth = len(text), _depth(text) if text[0] in "[{" else 0
         self.at += 1
-        while self.at < len(self.lines) and self.lines[self.at].indent > indent:
-            parts.append(self.lines[self.at].text)
+        while self.at < len(self.lines) and (
+            self.lines[self.at].indent > indent or depth > 0
+        ):
+            line = self.lines[self.at]
+            parts.append(line.text)
+            starts.append((end + 1, line.number, line.indent + 1))
+            end, depth = end + 1 + len(line.text), depth + _depth(line.text)
             self.at += 1
         whole = " ".join(parts)
-        if text[0] in "'\"" and len(parts) > 1:
+        if text[0] in "'\"" and len(starts) > 1:
             self.fail("a quoted text over several lines")
         if text[0] not in "[{":
             return self._scalar(whole)
+        self.starts = starts
         result, end = self._flow(whole, 0, 0)
         if end != len(whole):
             self.fail(f"more behind the bracket: {whole[end:]!r}")
@@ -177,10 +188,13 @@ class _Reader:
                 else re.split(r"[,\]}\[{]", text[at:], maxsplit=1)[0]
             )
             return self._scalar(word.rstrip(" ")), at + len(word)
-        is_list, pairs, items = text[at] == "[", dict[str, Any](), list[Any]()
+        is_list, pairs, items = text[at] == "[", dict[str, Any](), Items()
         close, at = "]" if is_list else "}", _behind_blanks(text, at + 1)
         while text[at : at + 1] != close:
             if is_list:
+                line = bisect_right(self.starts, at, key=itemgetter(0)) - 1
+                start, number, column = self.starts[line]
+                items.places.append((number, column + at - start))
                 item, at = self._flow(text, at, level + 1)
                 items.append(item)
             else:
@@ -227,6 +241,12 @@ class _Reader:
         if len(code) == 1 and code not in _ESCAPES:
             self.fail(f"no escape: {result[0]!r}")
         return chr(number) if len(code) > 1 else _ESCAPES[code]
+
+
+def _depth(text: str) -> int:
+    """Return how many more brackets a text opens than it closes, outside quotes."""
+    parts = [part[0] for part in _PART.finditer(text)]
+    return sum((part in "[{") - (part in "]}") for part in parts)
 
 
 def _behind_blanks(text: str, at: int) -> int:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import random
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import fuzzytree as ft
 from fuzzytree.auditing.decide import states
 from fuzzytree.auditing.findings.records import LIMITS, Audit, AuditAnswer
 from fuzzytree.exporters import yaml
 from fuzzytree.numerics import decide
-from fuzzytree.rechecking import CannotRunError, records, sentences
+from fuzzytree.rechecking import CannotRunError, recheck, records, sentences
 from fuzzytree.rechecking.case import strengths
 from fuzzytree.rechecking.curves import bounds, is_straight, turns
 from fuzzytree.rechecking.models import Model
@@ -188,3 +190,35 @@ def test_a_key_in_braces_is_any_name_of_a_class() -> None:
     for wrong in (b"p: {a: 1, 'a': 2}\n", b"p: {: 1}\n", b"p: {a, b: 1}\n"):
         with pytest.raises(CannotRunError):
             read_yaml(wrong, "x")
+
+
+FLOW = """format: fuzzytree/1
+kind: rule base
+name: hand
+classes: [no, maybe, yes]
+variables:
+- {name: heat, range: {from: 0, to: 10}, terms: [{name: low, points: [[2, 1], [4, 0]]},
+   {name: mid, points: [[3, 0], [4, 1], [5, 0]]},
+   {name: high, points: [[6, 0], [8, 1]]}]}
+rules: [
+  {if: [heat is low or mid], then: no}, {if: [heat is not high], then: maybe},
+{if: [heat is high], then: yes}
+]
+semantics: {and: minimum, or: maximum, not: 1 - degree, uncovered: no class,
+  missing: class maybe, answer: the class of the first of the strongest rules}
+"""
+
+
+def test_an_audit_of_a_file_in_flow_style_is_checked_again(tmp_path: Path) -> None:
+    path = tmp_path / "hand.yaml"
+    path.write_text(FLOW)
+    result = ft.audit(path)
+    assert any(answer.places for answer in result.answers)
+    report = recheck(result.to_json().encode(), path.read_bytes(), ("a", str(path)))
+    assert report.wrong == []
+    assert report.confirmed
+
+
+def test_items_in_brackets_have_places() -> None:
+    found = read_yaml(b"a: [x,\n  {b: [1]},\nz]\n", "x.yaml")
+    assert found["a"].places == [(1, 5), (2, 3), (3, 1)]
