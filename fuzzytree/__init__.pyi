@@ -36,6 +36,7 @@ from .model import Agreement as Agreement
 from .model import CheckSettings as CheckSettings
 from .model import FuzzySystem as FuzzySystem
 from .model import FuzzyTree as FuzzyTree
+from .model import ModelPath as ModelPath
 from .model import RuleBase as RuleBase
 from .runtimes import Outputs as Outputs
 from .runtimes import Predictions as Predictions

@@ -201,6 +201,11 @@ def read_content(content: bytes, form: Format, *, name: str) -> Reading:
     reading = form.read(content, name)
     if not isinstance(reading.model, FuzzySystem):
         return reading
+    if reading.rivals:
+        from fuzzytree.checking.engines import with_answers
+
+        rivals = (_rival(content, form, name, one) for one in reading.rivals)
+        reading = with_answers(reading, filter(None, rivals))
     narrow = [
         f"term {label.name!r} of {output.name!r} is 0 at all "
         f"{len(sampled_values(output))} values at which the range is sampled: rules "
@@ -208,6 +213,16 @@ def read_content(content: bytes, form: Format, *, name: str) -> Reading:
         for output, label in unsampled_terms(reading.model)
     ]
     return msgspec.structs.replace(reading, remarks=(*reading.remarks, *narrow))
+
+
+def _rival(content: bytes, form: Format, name: str, dialect: str) -> Reading | None:
+    """Return a file as another engine has it; None if that engine refuses it."""
+    assert form.read is not None  # refused above; for type checkers
+    try:
+        reading = form.read(content, name, dialect=dialect)
+    except ReadError:
+        return None
+    return msgspec.structs.replace(reading, dialect=f"{form.name}:{dialect}")
 
 
 def load(
@@ -554,7 +569,9 @@ def in_dialect(
 ) -> dict[str, Option]:
     """Return a writer's options, with the dialect of what was read in its format."""
     name, _, dialect = reading.dialect.partition(":")
-    return {"dialect": dialect, **options} if name == form.name else {**options}
+    is_known = "dialect" in inspect.signature(form.write).parameters
+    is_same = name == form.name and is_known
+    return {"dialect": dialect, **options} if is_same else {**options}
 
 
 def _certified(model: Model, form: Format, dtype: object) -> Proof:

@@ -99,8 +99,7 @@ def _with_format(name: str, *, metavar: str) -> Callable[[Any], Any]:
 def _model_path(context: click.Context, _parameter: object, path: str) -> ModelPath:
     from fuzzytree.checking import reading_format
 
-    result = ModelPath(path)
-    result.read_as = context.params["read_as"]
+    result = ModelPath(path, context.params["read_as"])
     if result.read_as is not None:
         with wrong_options():
             reading_format(result.read_as)

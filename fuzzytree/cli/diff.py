@@ -59,9 +59,8 @@ def command(options: DiffOptions) -> int:
     from fuzzytree import api
     from fuzzytree.report import diff_lines
 
-    new = ModelPath(options.new)
-    if Path(new).suffix.lower() == Path(options.old).suffix.lower():
-        new.read_as = options.old.read_as
+    is_alike = Path(options.new).suffix.lower() == Path(options.old).suffix.lower()
+    new = ModelPath(options.new, options.old.read_as if is_alike else None)
     with wrong_options(), progress_bar(quiet=options.quiet) as show:
         found = api.diff(
             options.old,

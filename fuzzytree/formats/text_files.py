@@ -45,11 +45,12 @@ class PartError(ReadError):
 
 
 class ReaderNotes(msgspec.Struct, frozen=True):
-    """The mistakes, losses and remarks that a reader collects."""
+    """The mistakes, losses and remarks that a reader collects, and other dialects."""
 
     mistakes: list[FileMistake] = msgspec.field(default_factory=list)
     losses: list[Loss] = msgspec.field(default_factory=list)
     remarks: list[str] = msgspec.field(default_factory=list)
+    rivals: list[str] = msgspec.field(default_factory=list)
 
     def mistake(self, position: Position, sentence: str) -> None:
         """Add a mistake."""
@@ -71,7 +72,7 @@ class ReaderNotes(msgspec.Struct, frozen=True):
     def reading(self, model: Document, locate: Locate, dialect: str = "") -> Reading:
         """Return a model with the losses and remarks."""
         losses, remarks = tuple(self.losses), tuple(self.remarks)
-        return Reading(model, losses, remarks, locate, dialect)
+        return Reading(model, losses, remarks, locate, dialect, tuple(self.rivals))
 
 
 def report(name: str, mistakes: Sequence[FileMistake]) -> ReadError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self, TypeAlias
 
 import msgspec
 
@@ -52,9 +52,22 @@ ModelSource = Document | Fitted | str | os.PathLike[str]
 
 
 class ModelPath(str):
-    """A path with the format to read; None is the suffix's (`reading_format`)."""
+    """A path with the format to read, and perhaps a dialect; None is the suffix's.
 
-    read_as: str | None = None
+    It stands for a path in every function that takes one.
+
+    Example:
+        >>> ModelPath("tip.fcl", "fcl:jfuzzylogic").read_as
+        'fcl:jfuzzylogic'
+    """
+
+    read_as: str | None
+
+    def __new__(cls, path: str | os.PathLike[str], read_as: str | None = None) -> Self:
+        """Return the path."""
+        result = super().__new__(cls, os.fspath(path))
+        result.read_as = read_as
+        return result
 
 
 ModelKind = Literal["tree", "rules", "system"]
@@ -120,6 +133,7 @@ class Reading(msgspec.Struct, frozen=True):
         locate: Where the parts of the model stand in the file.
         dialect: Whose meaning counted, behind the format: `fcl:jfuzzylogic`; empty of
             a format that has one meaning.
+        rivals: Other dialects that may be meant, if the file does not say which.
     """
 
     model: Document
@@ -127,6 +141,7 @@ class Reading(msgspec.Struct, frozen=True):
     remarks: tuple[str, ...] = ()
     locate: Locate = nowhere
     dialect: str = ""
+    rivals: tuple[str, ...] = ()
 
 
 class Writer(Protocol):

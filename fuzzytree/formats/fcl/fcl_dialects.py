@@ -92,6 +92,9 @@ _OF_FUZZYLITE = frozenset(
     {"DPROD", "DSUM", "EPROD", "ESUM", "HPROD", "HSUM", "NMIN", "NMAX", "COGSS"}
     | {"NONE"}
 )
+_PRIVATE: Final = ("fuzzylite", "jfuzzylogic")
+"""The engines that refuse words of another one."""
+
 _ORDER: Final[list[Dialect]] = ["fuzzylite", "jfuzzylogic", "pyit2fls", "iec"]
 
 
@@ -104,12 +107,18 @@ class DialectEvidence(NamedTuple):
     weight: int = 2
 
 
-def detect_dialect(text: FclText, wanted: Dialect | None) -> tuple[Dialect, str, bool]:
+def detect_dialect(
+    text: FclText, wanted: Dialect | None, notes: ReaderNotes
+) -> tuple[Dialect, str, bool]:
     """Return the dialect of a file, why it is, and whether no other one can be meant.
 
-    It is the wanted one, or the one that the words of the file speak for.
+    It is the wanted one, which must not contradict the file, or the one that the words
+    of the file speak for.
     """
-    named = wanted or _first_line(text.text)
+    mark = _first_line(text.text)
+    named = wanted or mark
+    if wanted is not None:
+        _refuse_contradiction(text, wanted, mark, notes)
     if named is not None:
         why = "as it is asked for" if wanted else "the first line says so"
         return named, f"the dialect is {SHOWN[named]}: {why}", True
@@ -131,6 +140,27 @@ def detect_dialect(text: FclText, wanted: Dialect | None) -> tuple[Dialect, str,
         sentence += f"; {SHOWN[other]} would have {_listed(result, other)}"
     is_certain = best in ("fuzzylite", "jfuzzylogic") and counts[best] > 1
     return best, sentence, is_certain
+
+
+def _refuse_contradiction(
+    text: FclText, wanted: Dialect, mark: Dialect | None, notes: ReaderNotes
+) -> None:
+    """Note why a file is for another engine than the wanted one, if it is.
+
+    The standard, PyIT2FLS and the portable profile are read with the words of all.
+    """
+    if mark not in (None, "portable", wanted) and wanted != "portable":
+        what = f"the first line says that the dialect is {mark}"
+        notes.mistake((1, 1), f"{what}; pass --from fcl:{mark}")
+        return
+    signs = sorted(_evidence(text), key=lambda one: one.line)
+    shared = {(one.line, one.what) for one in signs if one.dialect == wanted}
+    for one in signs:
+        is_other = one.weight > 1 and (one.line, one.what) not in shared
+        if wanted in _PRIVATE and one.dialect != "pyit2fls" and is_other:
+            what = f"{one.what} is read by {SHOWN[one.dialect]}, not by {SHOWN[wanted]}"
+            notes.mistake((one.line, 1), f"{what}; pass --from fcl:{one.dialect}")
+            return
 
 
 def is_marked(text: str) -> bool:

@@ -105,7 +105,7 @@ def read_fcl(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     """
     text = parsed(content, name)
     notes = ReaderNotes(list(text.mistakes), remarks=list(text.remarks))
-    dialect, sentence, is_certain = detect_dialect(text, dialect)
+    dialect, sentence, is_certain = detect_dialect(text, dialect, notes)
     notes.remark(sentence)
     title, blocks = blocks_of(text, notes)
     known = FclVariables({}, {}, dialect, notes, is_certain)
@@ -130,6 +130,8 @@ def read_fcl(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
         raise report(name, placed(positions(), error.mistakes)) from error
     model, facts = _model(joined_by_number(system), text.text, notes)
     written_as = "iec" if dialect == "pyit2fls" else dialect  # which PyIT2FLS reads
+    if not is_certain:
+        notes.rivals.extend({"iec", "jfuzzylogic"} - {written_as})
     return notes.reading(model, locating(positions, facts), f"fcl:{written_as}")
 
 

@@ -80,10 +80,10 @@ class FisSection(msgspec.Struct, frozen=True):
 
 
 class FisFile(msgspec.Struct, frozen=True):
-    """A file: its sections in their order, and the comments between them."""
+    """A file: its sections in their order, and the lines of comments between them."""
 
     sections: tuple[FisSection, ...]
-    comments: tuple[str, ...]
+    comments: dict[str, int]
 
 
 def read_page(content: bytes, name: str, notes: ReaderNotes) -> FisFile:
@@ -97,7 +97,7 @@ def read_page(content: bytes, name: str, notes: ReaderNotes) -> FisFile:
     result = notes.mistakes
     check_characters(text, name, _FORBIDDEN)
     sections: list[FisSection] = []
-    comments: list[str] = []
+    comments: dict[str, int] = {}
     earlier: dict[tuple[str, int], int] = {}
     lines = split_lines(text)
     if len(lines) > MOST_LINES:
@@ -108,7 +108,7 @@ def read_page(content: bytes, name: str, notes: ReaderNotes) -> FisFile:
     for number, line in enumerate(lines, 1):
         plain = line.strip()
         if plain.startswith(("#", "%", "//")):
-            comments.append(plain.lstrip("#%/").strip())
+            comments.setdefault(plain.lstrip("#%/").strip(), number)
         elif plain.startswith("["):
             _start_section(
                 (sections, earlier), plain, number, line.index("[") + 1, result
@@ -118,7 +118,7 @@ def read_page(content: bytes, name: str, notes: ReaderNotes) -> FisFile:
             result.append((number, 1, what))
         elif plain:
             _add_entry(sections[-1], line, number, result)
-    return FisFile(tuple(sections), tuple(comments))
+    return FisFile(tuple(sections), comments)
 
 
 def _start_section(

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
-from typing import Final
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -95,48 +95,82 @@ def read_fis(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     """
     notes = ReaderNotes()
     page = text.read_page(content, name, notes)
-    dialect = dialect or _dialect(page, notes)
+    dialect = _dialect(page, dialect, notes)
     parts = _system(page, name, dialect, notes)
     if notes.mistakes or parts is None:
         raise report(name, notes.mistakes)
     system, positions = parts
-    model, facts = as_written(system, page.comments, by_input=True)
+    model, facts = as_written(system, tuple(page.comments), by_input=True)
     return notes.reading(model, locating(positions, facts), f"fis:{dialect}")
 
 
-def _dialect(page: text.FisFile, notes: ReaderNotes) -> Dialect:
-    """Return whose file it is, by its comments and words, and say why."""
+def _dialect(page: text.FisFile, wanted: Dialect | None, notes: ReaderNotes) -> Dialect:
+    """Return whose file it is; say why, or what contradicts the wanted dialect."""
     for known in words.DIALECTS:
-        if f"{DIALECT}{known}" in page.comments:
-            notes.remark(f"read as {known}'s, as the file says")
+        line = page.comments.get(f"{DIALECT}{known}")
+        if line is not None and wanted in (None, known):
+            if wanted is None:
+                notes.remark(f"read as {known}'s, as the file says")
             return known
-    result, why = _signs(page)
-    notes.remark(f"read as {result}'s: {why}")
-    return result
+        if line is not None:
+            notes.mistake(
+                (line, 1), f"the file says that it is {known}'s; {_way_out(known)}"
+            )
+    signs = list(_signs(page))
+    if wanted is None and signs:
+        notes.remark(f"read as {signs[0].dialect}'s: {signs[0].why}")
+        return signs[0].dialect
+    if wanted is None:
+        notes.remark("read as matlab's: nothing says otherwise")
+        notes.rivals.extend(("octave", "fuzzylite"))
+        return "matlab"
+    for sign in signs:
+        is_shared = sign.dialect == "octave" and wanted == "fuzzylite"
+        if sign.is_private and sign.dialect != wanted and not is_shared:
+            notes.mistake((sign.line, 1), f"{sign.why}; {_way_out(sign.dialect)}")
+            break
+    return wanted
 
 
-def _signs(page: text.FisFile) -> tuple[Dialect, str]:
-    comments = " ".join(page.comments).lower()
+def _way_out(dialect: Dialect) -> str:
+    return f"pass --from fis:{dialect}"
+
+
+class FisSign(NamedTuple):
+    """Why a file is for an engine, and whether the others refuse what it says there."""
+
+    dialect: Dialect
+    why: str
+    line: int
+    is_private: bool = False
+
+
+def _signs(page: text.FisFile) -> Iterator[FisSign]:
+    """Yield the signs of engines, those that count most first."""
     entries = [entry for section in page.sections for entry in section.entries]
     for entry in entries:
         kind = entry.value.rpartition("[")[0].rstrip(" ,").rpartition(":")[2]
-        private = kind.strip(" '")
-        if entry.key in _PRIVATE_KEYS:
-            return "fuzzylite", f"{entry.key} in line {entry.line} is only fuzzylite's"
-        if text.TERM.fullmatch(entry.key) and private in words.PRIVATE:
-            return "fuzzylite", f"{private} in line {entry.line} is only fuzzylite's"
-    if "fuzzylite" in comments:
-        return "fuzzylite", "a comment names it"
-    if "fuzzy-logic-toolkit" in comments:
-        return "octave", "a comment names its fuzzy-logic-toolkit"
+        word = kind.strip(" '")
+        is_term = text.TERM.fullmatch(entry.key) is not None
+        if entry.key in _PRIVATE_KEYS or (is_term and word in words.PRIVATE):
+            what = word if is_term else entry.key
+            why = f"{what} in line {entry.line} is only fuzzylite's"
+            yield FisSign("fuzzylite", why, entry.line, what != "discretemf")
+    for comment, line in page.comments.items():
+        if "fuzzylite" in comment.lower():
+            yield FisSign("fuzzylite", "a comment names it", line)
+    for comment, line in page.comments.items():
+        if "fuzzy-logic-toolkit" in comment.lower():
+            yield FisSign("octave", "a comment names its fuzzy-logic-toolkit", line)
     for entry in entries:
         if entry.key.endswith("Method") and "_" in entry.value:
-            return "octave", f"{entry.value} in line {entry.line} is no word of MATLAB"
+            why = f"{entry.value} in line {entry.line} is no word of MATLAB"
+            yield FisSign("octave", why, entry.line, is_private=True)
         indices = entry.value.partition("(")[0]
         numbers = text.numbers_of(indices, 0, 0, [])
         if not entry.key and any(number % 1 for number in numbers):
-            return "octave", f"line {entry.line} has hedges, which MATLAB has not"
-    return "matlab", "nothing says otherwise"
+            why = f"line {entry.line} has hedges, which MATLAB has not"
+            yield FisSign("octave", why, entry.line, is_private=True)
 
 
 def _system(
@@ -180,7 +214,6 @@ def _system(
     )
     if dialect == "matlab":
         outputs = _with_middles(outputs, block.rules, notes)
-    _compare(outputs, block, methods, dialect, notes)
     if dialect == "fuzzylite":
         for output in outputs:
             notes.losses.extend(fuzzylite_losses(output))
@@ -429,26 +462,3 @@ def middle(low: float | None, high: float | None) -> float | None:
         15.0
     """
     return None if low is None or high is None else low / 2 + high / 2
-
-
-def _compare(
-    outputs: Sequence[SystemOutput],
-    block: RuleBlock,
-    methods: _Methods,
-    dialect: Dialect,
-    notes: ReaderNotes,
-) -> None:
-    """Say where Octave would answer otherwise than the others."""
-    is_weighted = methods.defuzzifier.is_weighted
-    if not is_weighted or methods.aggregation in (None, "sum") or dialect == "octave":
-        return
-    for output in outputs:
-        concluded = [
-            one.term for r in block.rules for one in r.then if one.output == output.name
-        ]
-        if len(set(concluded)) < len(concluded):
-            notes.remark(
-                f"output {output.name!r}: several rules conclude one term, and their "
-                f"degrees are summed, as {dialect} does; Octave would join them by "
-                f"{methods.aggregation}"
-            )

@@ -95,7 +95,8 @@ def read_fll(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     is_own = "Written by fuzzytree." in page.comments
     system = _join_numbers(system, dialect, notes, is_own=is_own)
     model, facts = as_written(system, page.comments)
-    return notes.reading(model, locating(positions, facts))
+    engine = dialect or ("pyfuzzylite" if "fuzzylite" in notes.rivals else "fuzzylite")
+    return notes.reading(model, locating(positions, facts), f"fll:{engine}")
 
 
 def _system(
@@ -150,6 +151,7 @@ def _join_numbers(
         else:
             what += "; pass --from fll:fuzzylite or --from fll:pyfuzzylite"
             notes.loss(f"output {output.name!r}", what)
+            notes.rivals[:] = ["fuzzylite" if output.aggregation else "pyfuzzylite"]
     return replace(system, outputs=tuple(outputs.values()))
 
 
