@@ -16,6 +16,7 @@ from fuzzytree.exporters.fcl_rules import (
     block_lines,
     check_list,
     has_accu,
+    is_always_concluded,
     losses_of,
     norm_losses,
     with_conditions,
@@ -299,6 +300,14 @@ def _remarks(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator
         Or in joints(rule.when) for rule in system.rules
     ):
         yield "JFML does not read OR; fuzzylite and jFuzzyLogic agree on it"
+    for one in system.outputs:
+        has_default = one.default is not None or words.name == "fuzzylite"
+        if not has_default and not is_always_concluded(one, system):
+            yield (
+                f"output {one.name!r}: no DEFAULT is written: where no rule fires, a "
+                "row on its own has no number, and jFuzzyLogic's `getValue` that of "
+                "the row before"
+            )
 
 
 FORMAT = Format(

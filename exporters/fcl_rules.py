@@ -194,9 +194,6 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
         yield from grid_losses(output, default, whose)
         if output.clips and words.name != "fuzzylite":
             yield Loss(where, "its value is not clamped to its range")
-        has_default = output.default is not None or words.name == "fuzzylite"
-        if not has_default and not _is_always_concluded(output, system):
-            yield Loss(where, "NaN where no rule fires: engines keep the value before")
         if words.name == "fuzzylite":
             yield from fuzzylite_losses(output)
         yield from _accu_losses(output, system, words)
@@ -216,7 +213,7 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
             yield Loss(f"rule block {k}", what + repr(block.disjunction))
 
 
-def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
+def is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
     """Return whether some rule concludes an output for every row."""
     constants = {
         (one.name, label.name)

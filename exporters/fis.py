@@ -29,6 +29,7 @@ from fuzzytree.formats import (
     FIS_METHODS,
     FIS_SNORMS,
     FIS_TNORMS,
+    OCTAVE_BISECTOR,
     PRIVATE,
     Dialect,
     always_concluded,
@@ -222,6 +223,8 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             yield Loss(f"variable {variable.name!r}", what)
     if dialect == "octave":
         yield from number_losses(system)
+        if first.defuzzifier.method == "bisector":
+            yield Loss("DefuzzMethod", OCTAVE_BISECTOR)
     yield from _block_losses(system, dialect)
 
 

@@ -199,13 +199,13 @@ def read_content(content: bytes, form: Format, *, name: str) -> Reading:
         raise ReadError(f"{name}:1:1: the file is empty")
     assert form.read is not None  # refused above; for type checkers
     reading = form.read(content, name)
-    if not isinstance(reading.model, FuzzySystem):
-        return reading
     if reading.rivals:
         from fuzzytree.checking.engines import with_answers
 
         rivals = (_rival(content, form, name, one) for one in reading.rivals)
         reading = with_answers(reading, filter(None, rivals))
+    if not isinstance(reading.model, FuzzySystem):
+        return reading
     narrow = [
         f"term {label.name!r} of {output.name!r} is 0 at all "
         f"{len(sampled_values(output))} values at which the range is sampled: rules "

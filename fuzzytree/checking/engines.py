@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from msgspec.structs import replace
@@ -30,48 +30,57 @@ def with_answers(reading: Reading, rivals: Iterable[Reading]) -> Reading:
         first, second = reading.model, rival.model
         if not isinstance(first, FuzzySystem) or not isinstance(second, FuzzySystem):
             continue
-        names = reading.dialect, rival.dialect
-        way_out = f"pass --from {names[0]} or --from {names[1]}"
         outputs = [
             replace(output, defuzzifier=other.defuzzifier)
             for output, other in zip(second.outputs, first.outputs, strict=True)
         ]
         alike = replace(second, outputs=tuple(outputs))
-        if sentence := _difference(first, alike, names):
-            losses.append(Loss("engines", f"{sentence}; {way_out}"))
-        elif sentence := _difference(first, second, names):
-            remarks.append(f"engines sample ranges otherwise: {sentence}; {way_out}")
+        systems = {reading.dialect: first, rival.dialect: second}
+        if place := _place(first, alike):
+            losses.append(Loss("engines", _sentence(systems, *place)))
+        elif place := _place(first, second):
+            sentence = _sentence(systems, *place)
+            remarks.append(f"engines sample ranges otherwise: {sentence}")
     return replace(reading, losses=tuple(losses), remarks=tuple(remarks))
 
 
-def _difference(
-    first: FuzzySystem, second: FuzzySystem, names: tuple[str, str]
-) -> str | None:
-    """Return what two systems answer where they differ most; None if they agree.
+def _place(first: FuzzySystem, second: FuzzySystem) -> tuple[int, FloatArray] | None:
+    """Return the output and the values at which two systems differ most, if they do.
 
     Rows to which one of them has no number are left out: it is no answer.
     """
     if first == second:
         return None
     values = _values(first)
-    answers = [run_system(system)(values).outputs for system in (first, second)]
-    apart = np.abs(answers[0] - answers[1])
-    apart /= np.maximum(np.abs(answers[0]), 1.0)
+    answers = [_outputs(system, values) for system in (first, second)]
+    apart = np.abs(answers[0] - answers[1]) / np.maximum(np.abs(answers[0]), 1.0)
     apart = np.where(np.isfinite(apart), apart, 0.0)
     if not apart.size or apart.max() <= _AGREEMENT:
         return None
     output, row = np.unravel_index(apart.argmax(), apart.shape)
-    point = [
-        f"{name} = {value!r}"
-        for name, value in zip(first.inputs, values[:, row].tolist(), strict=True)
+    return int(output), values[:, [row]]
+
+
+def _sentence(
+    systems: Mapping[str, FuzzySystem], output: int, values: FloatArray
+) -> str:
+    """Return what dialects of a file answer to one row, and how to choose one."""
+    answers = [
+        f"{_outputs(system, values)[output, 0]:.9g} in {name}"
+        for name, system in systems.items()
     ]
-    shown = [
-        f"{answer[output, row]:.9g} in {name}"
-        for answer, name in zip(answers, names, strict=True)
-    ]
-    return (
-        f"{first.outputs[output].name} is {' and '.join(shown)} at {', '.join(point)}"
-    )
+    system, *_ = systems.values()
+    row = zip(system.inputs, values[:, 0].tolist(), strict=True)
+    point = ", ".join(f"{name} = {value!r}" for name, value in row)
+    choice = " or ".join(f"--from {name}" for name in systems)
+    name = system.outputs[output].name
+    return f"{name} is {' and '.join(answers)} at {point}; pass {choice}"
+
+
+def _outputs(system: FuzzySystem, values: FloatArray) -> FloatArray:
+    outputs = run_system(system)(values).outputs
+    assert outputs is not None  # a system has some; for type checkers
+    return outputs
 
 
 def _values(system: FuzzySystem) -> FloatArray:

@@ -10,6 +10,7 @@ from .fcl.fcl_reader import read_fcl as read_fcl
 from .fcl.fcl_terms import shape_in_fcl as shape_in_fcl
 from .fis.fis_reader import DEFAULTS as DEFAULTS
 from .fis.fis_reader import DIALECT as DIALECT
+from .fis.fis_reader import OCTAVE_BISECTOR as OCTAVE_BISECTOR
 from .fis.fis_reader import always_concluded as always_concluded
 from .fis.fis_reader import middle as middle
 from .fis.fis_reader import read_fis as read_fis

@@ -60,6 +60,10 @@ DEFAULTS: Final = {
     "fuzzylite": Defuzzifier("centroid", 100, "middle"),
 }
 
+OCTAVE_BISECTOR: Final = (
+    "Octave's bisector answers the number of a sample, from 1, and here its value"
+)
+
 
 class _Methods(msgspec.Struct, frozen=True):
     """What [System] says."""
@@ -288,10 +292,7 @@ def _methods(
         what = f"a {word('Type')!r} system cannot have the DefuzzMethod {method!r}"
         notes.mistake(entry.position, what)
     if how.method == "bisector" and dialect == "octave":
-        notes.remark(
-            "Octave's bisector answers the number of a sample and not its value; "
-            "this is read as the value"
-        )
+        notes.loss("DefuzzMethod", OCTAVE_BISECTOR)
     return _Methods(
         title,
         norm("AndMethod", words.FIS_TNORMS),  # type: ignore[arg-type]  # its values
