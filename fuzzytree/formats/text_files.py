@@ -51,6 +51,7 @@ class ReaderNotes(msgspec.Struct, frozen=True):
     losses: list[Loss] = msgspec.field(default_factory=list)
     remarks: list[str] = msgspec.field(default_factory=list)
     rivals: list[str] = msgspec.field(default_factory=list)
+    dialect: str = ""  # as named by the caller
 
     def mistake(self, position: Position, sentence: str) -> None:
         """Add a mistake."""

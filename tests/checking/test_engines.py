@@ -160,6 +160,41 @@ def test_other_samples_of_a_range_are_a_remark_with_both_answers() -> None:
     assert "in fis:fuzzylite at food = " in remarks[1]
 
 
+def test_a_resolution_that_a_file_leaves_out_is_that_of_the_named_engine() -> None:
+    text = FLL.replace("WeightedAverage", "Centroid\n  aggregation: Maximum")
+    text = text.replace("RuleBlock:", "RuleBlock:\n  implication: Minimum")
+    for name, samples in (("fll:fuzzylite", 100), ("fll:pyfuzzylite", 1000)):
+        model = reading(text, name).model
+        assert isinstance(model, FuzzySystem)
+        assert model.outputs[0].defuzzifier.samples == samples
+    found = reading(text, "fll")
+    assert found.losses == ()
+    [remark] = [one for one in found.remarks if one.startswith("engines sample")]
+    assert "in fll:pyfuzzylite and " in remark
+    assert "in fll:fuzzylite at food = " in remark
+
+
+def test_octaves_bisector_is_a_loss() -> None:
+    text = MAMDANI.replace("centroid", "bisector")
+    [loss] = reading(text, "fis:octave").losses
+    assert loss.what.startswith("Octave's bisector answers the number of a sample")
+    assert reading(text, "fis:fuzzylite").losses == ()
+    model = reading(text, "fis:matlab").model
+    for dialect, count in (("octave", 1), ("matlab", 0)):
+        written = ft.export(model, "fis", allow_loss=True, dialect=dialect)
+        assert sum("bisector" in one.what for one in written.losses) == count
+
+
+def test_an_output_without_default_is_written_without_it() -> None:
+    text = of_fcl("ACCU : MAX;", "a IS p", NUMBERS).replace("DEFAULT := 0;", "")
+    for name in ("fcl:iec", "fcl:jfuzzylogic"):
+        model = reading(text, name).model
+        written = ft.export(model, "fcl", dialect=name[4:])
+        assert "DEFAULT" not in written.content.decode()
+        assert any("no DEFAULT is written" in one for one in written.remarks)
+        assert reading(written.content.decode(), "fcl").model == model
+
+
 def test_engines_that_agree_are_no_loss() -> None:
     text = FIS.replace("AggMethod='max'", "AggMethod='sum'")
     found = reading(text.format(rule="2, 2 (1) : 1"), "fis")

@@ -17,7 +17,11 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fll import fll_words as fll
-from fuzzytree.formats.fll.fll_differences import differences, joined_twice
+from fuzzytree.formats.fll.fll_differences import (
+    differences,
+    fuzzylite_losses,
+    joined_twice,
+)
 from fuzzytree.formats.fll.fll_rules import FllVariable, Vocabulary, read_rule
 from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree, read_term
 from fuzzytree.formats.fll.fll_words import MOST_BYTES, FllEntry, FllSection, read_page
@@ -81,7 +85,7 @@ def read_fll(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
         >>> read_fll("\n".join(lines).encode(), "tip.fll").model.inputs
         ('food',)
     """
-    notes = ReaderNotes()
+    notes = ReaderNotes(dialect=dialect or "")
     text, remarks = decoded(content, name, MOST_BYTES)
     check_characters(text, name, CONTROL)
     notes.remarks.extend(remarks)
@@ -94,6 +98,8 @@ def read_fll(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
     system, positions = parts
     is_own = "Written by fuzzytree." in page.comments
     system = _join_numbers(system, dialect, notes, is_own=is_own)
+    for output in system.outputs if dialect == "fuzzylite" else ():
+        notes.losses.extend(fuzzylite_losses(output))
     model, facts = as_written(system, page.comments)
     engine = dialect or ("pyfuzzylite" if "fuzzylite" in notes.rivals else "fuzzylite")
     return notes.reading(model, locating(positions, facts), f"fll:{engine}")

@@ -316,8 +316,10 @@ def defuzzifier(
             sentence = f"no type {kind!r}; {name_choice(kind, TYPES)}"
             notes.mistake(rest[0].position, sentence)
         return Defuzzifier(method), kind
-    samples = _count(rest[0], 2, notes) if rest else SAMPLES
-    if not rest:
+    usual = 100 if notes.dialect == "fuzzylite" else SAMPLES
+    samples = _count(rest[0], 2, notes) if rest else usual
+    if not rest and not notes.dialect:
+        notes.rivals[:] = ["fuzzylite"]
         notes.remark(
             f"line {entry.line}: {name.text} without a resolution looks at {SAMPLES} "
             "values, as in pyfuzzylite; fuzzylite 6 looks at 100"
