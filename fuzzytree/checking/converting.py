@@ -202,8 +202,7 @@ def read_content(content: bytes, form: Format, *, name: str) -> Reading:
     if reading.rivals:
         from fuzzytree.checking.engines import with_answers
 
-        rivals = (_rival(content, form, name, one) for one in reading.rivals)
-        reading = with_answers(reading, filter(None, rivals))
+        reading = with_answers(reading, functools.partial(form.read, content, name))
     if not isinstance(reading.model, FuzzySystem):
         return reading
     narrow = [
@@ -213,16 +212,6 @@ def read_content(content: bytes, form: Format, *, name: str) -> Reading:
         for output, label in unsampled_terms(reading.model)
     ]
     return msgspec.structs.replace(reading, remarks=(*reading.remarks, *narrow))
-
-
-def _rival(content: bytes, form: Format, name: str, dialect: str) -> Reading | None:
-    """Return a file as another engine has it; None if that engine refuses it."""
-    assert form.read is not None  # refused above; for type checkers
-    try:
-        reading = form.read(content, name, dialect=dialect)
-    except ReadError:
-        return None
-    return msgspec.structs.replace(reading, dialect=f"{form.name}:{dialect}")
 
 
 def load(

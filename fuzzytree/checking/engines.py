@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from msgspec.structs import replace
 
+from fuzzytree.errors import ReadError
 from fuzzytree.model import FloatArray, FuzzySystem, Loss, Reading
 from fuzzytree.runtimes import run_system
 from fuzzytree.semantics import Aim, range_rows, system_probes
@@ -15,7 +16,7 @@ _ROWS = 200  # of each kind: on landmarks, drawn evenly, and aimed at rules
 _AGREEMENT = 1e-9  # relative; engines of one meaning are as near in our tests
 
 
-def with_answers(reading: Reading, rivals: Iterable[Reading]) -> Reading:
+def with_answers(reading: Reading, read: Callable[..., Reading]) -> Reading:
     """Return a reading that names a point where rivals have another answer.
 
     A difference is a loss. It is a remark if it is gone where both look at the same
@@ -23,10 +24,14 @@ def with_answers(reading: Reading, rivals: Iterable[Reading]) -> Reading:
 
     Args:
         reading: What was read of a file that names no dialect.
-        rivals: The same file, as other engines have it.
+        read: Reads the same file in another `dialect`.
     """
     losses, remarks = list(reading.losses), list(reading.remarks)
-    for rival in rivals:
+    for dialect in reading.rivals:
+        try:
+            rival = read(dialect=dialect)
+        except ReadError:
+            continue  # that engine refuses the file
         first, second = reading.model, rival.model
         if not isinstance(first, FuzzySystem) or not isinstance(second, FuzzySystem):
             continue

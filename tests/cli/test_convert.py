@@ -673,7 +673,8 @@ def test_the_named_engine_is_the_one_that_a_rule_is_read_for(call: Call) -> None
         "jFuzzyLogic reads (a OR b) AND c; write parentheses, or pass --from fcl:iec "
         "or --from fcl:jfuzzylogic\n"
         "  engines: y is 3.39844278 in fcl:iec and 0 in fcl:jfuzzylogic at "
-        "a = 0.03518, c = 0.4663, d = 0.0; pass --from fcl:iec or --from fcl:jfuzzylogic\n"
+        "a = 0.03518, c = 0.4663, d = 0.0; pass --from fcl:iec or "
+        "--from fcl:jfuzzylogic\n"
         "  pass --allow-loss to read it as stated\n",
     )
     for engine, answer in (("jfuzzylogic", 20.0), ("iec", 90.0 / 1.7)):

@@ -260,7 +260,10 @@ def test_hundredths_are_hedges_and_mean_other_things_in_octave_and_fuzzylite() -
     ("change", "remark"),
     [
         (("", ""), "read as matlab's: nothing says otherwise"),
-        (("a comment", "dialect: octave"), "read as octave's, as the file says"),
+        (
+            ("a comment", "dialect: octave"),
+            "read as octave's: the file says that it is",
+        ),
         (("a comment", "by fuzzylite 6"), "read as fuzzylite's: a comment names it"),
         (
             ("'prod'\nOr", "'einstein_product'\nOr"),

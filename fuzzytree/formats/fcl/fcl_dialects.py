@@ -92,9 +92,6 @@ _OF_FUZZYLITE = frozenset(
     {"DPROD", "DSUM", "EPROD", "ESUM", "HPROD", "HSUM", "NMIN", "NMAX", "COGSS"}
     | {"NONE"}
 )
-_PRIVATE: Final = ("fuzzylite", "jfuzzylogic")
-"""The engines that refuse words of another one."""
-
 _ORDER: Final[list[Dialect]] = ["fuzzylite", "jfuzzylogic", "pyit2fls", "iec"]
 
 
@@ -153,11 +150,13 @@ def _refuse_contradiction(
         what = f"the first line says that the dialect is {mark}"
         notes.mistake((1, 1), f"{what}; pass --from fcl:{mark}")
         return
+    if wanted not in ("fuzzylite", "jfuzzylogic"):
+        return
     signs = sorted(_evidence(text), key=lambda one: one.line)
     shared = {(one.line, one.what) for one in signs if one.dialect == wanted}
     for one in signs:
-        is_other = one.weight > 1 and (one.line, one.what) not in shared
-        if wanted in _PRIVATE and one.dialect != "pyit2fls" and is_other:
+        is_shared = one.weight < 2 or (one.line, one.what) in shared
+        if not is_shared and one.dialect != "pyit2fls":
             what = f"{one.what} is read by {SHOWN[one.dialect]}, not by {SHOWN[wanted]}"
             notes.mistake((one.line, 1), f"{what}; pass --from fcl:{one.dialect}")
             return

@@ -11,7 +11,7 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
-from typing import Final, NamedTuple
+from typing import Final
 
 import msgspec
 
@@ -110,47 +110,29 @@ def read_fis(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
 
 def _dialect(page: text.FisFile, wanted: Dialect | None, notes: ReaderNotes) -> Dialect:
     """Return whose file it is; say why, or what contradicts the wanted dialect."""
-    for known in words.DIALECTS:
-        line = page.comments.get(f"{DIALECT}{known}")
-        if line is not None and wanted in (None, known):
-            if wanted is None:
-                notes.remark(f"read as {known}'s, as the file says")
-            return known
-        if line is not None:
-            notes.mistake(
-                (line, 1), f"the file says that it is {known}'s; {_way_out(known)}"
-            )
     signs = list(_signs(page))
-    if wanted is None and signs:
-        notes.remark(f"read as {signs[0].dialect}'s: {signs[0].why}")
-        return signs[0].dialect
     if wanted is None:
-        notes.remark("read as matlab's: nothing says otherwise")
-        notes.rivals.extend(("octave", "fuzzylite"))
-        return "matlab"
-    for sign in signs:
-        is_shared = sign.dialect == "octave" and wanted == "fuzzylite"
-        if sign.is_private and sign.dialect != wanted and not is_shared:
-            notes.mistake((sign.line, 1), f"{sign.why}; {_way_out(sign.dialect)}")
+        if not signs:
+            notes.rivals.extend(("octave", "fuzzylite"))
+        result, why, _ = [*signs, ("matlab", "nothing says otherwise", 0)][0]
+        notes.remark(f"read as {result}'s: {why}")
+        return result
+    for known, why, line in signs:
+        is_shared = known == "octave" and wanted == "fuzzylite"
+        if line and known != wanted and not is_shared:
+            notes.mistake((line, 1), f"{why}; pass --from fis:{known}")
             break
     return wanted
 
 
-def _way_out(dialect: Dialect) -> str:
-    return f"pass --from fis:{dialect}"
+def _signs(page: text.FisFile) -> Iterator[tuple[Dialect, str, int]]:
+    """Yield whose words a file has, why, and where, those that count most first.
 
-
-class FisSign(NamedTuple):
-    """Why a file is for an engine, and whether the others refuse what it says there."""
-
-    dialect: Dialect
-    why: str
-    line: int
-    is_private: bool = False
-
-
-def _signs(page: text.FisFile) -> Iterator[FisSign]:
-    """Yield the signs of engines, those that count most first."""
+    The line is 0 of what other engines have or ignore.
+    """
+    for known in words.DIALECTS:
+        if line := page.comments.get(f"{DIALECT}{known}"):
+            yield known, f"the file says that it is {known}'s", line
     entries = [entry for section in page.sections for entry in section.entries]
     for entry in entries:
         kind = entry.value.rpartition("[")[0].rstrip(" ,").rpartition(":")[2]
@@ -159,22 +141,21 @@ def _signs(page: text.FisFile) -> Iterator[FisSign]:
         if entry.key in _PRIVATE_KEYS or (is_term and word in words.PRIVATE):
             what = word if is_term else entry.key
             why = f"{what} in line {entry.line} is only fuzzylite's"
-            yield FisSign("fuzzylite", why, entry.line, what != "discretemf")
-    for comment, line in page.comments.items():
-        if "fuzzylite" in comment.lower():
-            yield FisSign("fuzzylite", "a comment names it", line)
-    for comment, line in page.comments.items():
-        if "fuzzy-logic-toolkit" in comment.lower():
-            yield FisSign("octave", "a comment names its fuzzy-logic-toolkit", line)
+            yield "fuzzylite", why, entry.line if what != "discretemf" else 0
+    comments = " ".join(page.comments).lower()
+    if "fuzzylite" in comments:
+        yield "fuzzylite", "a comment names it", 0
+    if "fuzzy-logic-toolkit" in comments:
+        yield "octave", "a comment names its fuzzy-logic-toolkit", 0
     for entry in entries:
         if entry.key.endswith("Method") and "_" in entry.value:
             why = f"{entry.value} in line {entry.line} is no word of MATLAB"
-            yield FisSign("octave", why, entry.line, is_private=True)
+            yield "octave", why, entry.line
         indices = entry.value.partition("(")[0]
         numbers = text.numbers_of(indices, 0, 0, [])
         if not entry.key and any(number % 1 for number in numbers):
             why = f"line {entry.line} has hedges, which MATLAB has not"
-            yield FisSign("octave", why, entry.line, is_private=True)
+            yield "octave", why, entry.line
 
 
 def _system(

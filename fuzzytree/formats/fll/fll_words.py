@@ -320,8 +320,4 @@ def defuzzifier(
     samples = _count(rest[0], 2, notes) if rest else usual
     if not rest and not notes.dialect:
         notes.rivals[:] = ["fuzzylite"]
-        notes.remark(
-            f"line {entry.line}: {name.text} without a resolution looks at {SAMPLES} "
-            "values, as in pyfuzzylite; fuzzylite 6 looks at 100"
-        )
     return Defuzzifier(method, samples), ""
