@@ -29,11 +29,11 @@ from fuzzytree.formats import (
     FIS_METHODS,
     FIS_SNORMS,
     FIS_TNORMS,
-    OCTAVE_BISECTOR,
     PRIVATE,
     Dialect,
     always_concluded,
     fuzzylite_losses,
+    method_loss,
     middle,
     read_fis,
     word_for,
@@ -206,6 +206,8 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
         if how.method != first.defuzzifier.method:
             what = f"{how.method} becomes {first.defuzzifier.method}, as of the first"
             yield Loss(where, what)
+        if what := method_loss(how.method, output.low, dialect):
+            yield Loss(where, what)
         whose = f"FIS does not say so; {dialect} takes"
         yield from grid_losses(output, DEFAULTS[dialect], whose)
         if output.aggregation != first.aggregation:
@@ -223,8 +225,6 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             yield Loss(f"variable {variable.name!r}", what)
     if dialect == "octave":
         yield from number_losses(system)
-        if first.defuzzifier.method == "bisector":
-            yield Loss("DefuzzMethod", OCTAVE_BISECTOR)
     yield from _block_losses(system, dialect)
 
 

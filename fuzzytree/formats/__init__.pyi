@@ -10,7 +10,6 @@ from .fcl.fcl_reader import read_fcl as read_fcl
 from .fcl.fcl_terms import shape_in_fcl as shape_in_fcl
 from .fis.fis_reader import DEFAULTS as DEFAULTS
 from .fis.fis_reader import DIALECT as DIALECT
-from .fis.fis_reader import OCTAVE_BISECTOR as OCTAVE_BISECTOR
 from .fis.fis_reader import always_concluded as always_concluded
 from .fis.fis_reader import middle as middle
 from .fis.fis_reader import read_fis as read_fis
@@ -24,6 +23,7 @@ from .fis.fis_words import FIS_TNORMS as FIS_TNORMS
 from .fis.fis_words import PRIVATE as PRIVATE
 from .fis.fis_words import Dialect as Dialect
 from .fis.fis_words import curve_of as curve_of
+from .fis.fis_words import method_loss as method_loss
 from .fll.fll_differences import differences as differences
 from .fll.fll_differences import fuzzylite_losses as fuzzylite_losses
 from .fll.fll_differences import joined_twice as joined_twice

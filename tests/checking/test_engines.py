@@ -174,15 +174,28 @@ def test_a_resolution_that_a_file_leaves_out_is_that_of_the_named_engine() -> No
     assert "in fll:fuzzylite at food = " in remark
 
 
-def test_octaves_bisector_is_a_loss() -> None:
-    text = MAMDANI.replace("centroid", "bisector")
-    [loss] = reading(text, "fis:octave").losses
-    assert loss.what.startswith("Octave's bisector answers the number of a sample")
-    assert reading(text, "fis:fuzzylite").losses == ()
-    model = reading(text, "fis:matlab").model
-    for dialect, count in (("octave", 1), ("matlab", 0)):
-        written = ft.export(model, "fis", allow_loss=True, dialect=dialect)
-        assert sum("bisector" in one.what for one in written.losses) == count
+@pytest.mark.parametrize(
+    ("method", "low", "dialect", "sentence"),
+    [
+        ("bisector", 0, "octave", "Octave's bisector is the number of a sample"),
+        ("bisector", 0, "matlab", "MATLAB's bisector is the first sample with half"),
+        ("som", -9, "matlab", "MATLAB's som is the value of the smallest size"),
+        ("lom", -9, "matlab", "MATLAB's lom is the value of the largest size"),
+        ("som", 0, "matlab", ""),
+        ("lom", -9, "octave", ""),
+        ("mom", -9, "matlab", ""),
+        ("bisector", 0, "fuzzylite", ""),
+    ],
+)
+def test_a_method_of_one_engine_alone_is_a_loss(
+    method: str, low: int, dialect: str, sentence: str
+) -> None:
+    text = MAMDANI.replace("centroid", method).replace("[0 30]", f"[{low} 30]")
+    found = reading(text, f"fis:{dialect}")
+    written = ft.export(found.model, "fis", allow_loss=True, dialect=dialect)
+    for losses in (found.losses, written.losses):
+        assert len(losses) == bool(sentence)
+        assert all(one.what.startswith(sentence) for one in losses)
 
 
 def test_an_output_without_default_is_written_without_it() -> None:

@@ -60,10 +60,6 @@ DEFAULTS: Final = {
     "fuzzylite": Defuzzifier("centroid", 100, "middle"),
 }
 
-OCTAVE_BISECTOR: Final = (
-    "Octave's bisector answers the number of a sample, from 1, and here its value"
-)
-
 
 class _Methods(msgspec.Struct, frozen=True):
     """What [System] says."""
@@ -272,8 +268,6 @@ def _methods(
         entry = entries["Type"]
         what = f"a {word('Type')!r} system cannot have the DefuzzMethod {method!r}"
         notes.mistake(entry.position, what)
-    if how.method == "bisector" and dialect == "octave":
-        notes.loss("DefuzzMethod", OCTAVE_BISECTOR)
     return _Methods(
         title,
         norm("AndMethod", words.FIS_TNORMS),  # type: ignore[arg-type]  # its values
@@ -378,6 +372,8 @@ def _output(
     is_joined = not how.is_weighted or (
         dialect == "octave" and methods.aggregation != "sum"
     )
+    if what := words.method_loss(how.method, low, dialect):
+        notes.loss(f"output {name!r}", what)
     return SystemOutput(
         name,
         labels,

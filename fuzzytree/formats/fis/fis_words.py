@@ -21,6 +21,7 @@ from fuzzytree.formats.words import (
 from fuzzytree.model import (
     MOST_POINTS,
     Curve,
+    DefuzzifierMethod,
     Hedge,
     Points,
 )
@@ -59,6 +60,31 @@ CONCLUDING_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
     40: ("somewhat", "somewhat"),
 }
 """The same behind the comma of a Sugeno rule in Octave, which takes the root there."""
+
+
+def method_loss(
+    method: DefuzzifierMethod, low: float | None, dialect: Dialect
+) -> str | None:
+    """Return what an engine means by a method that no output has here, if it does.
+
+    Example:
+        >>> method_loss("largest of maximum", -10.0, "matlab")
+        "MATLAB's lom is the value of the largest size, and here the largest value"
+    """
+    match dialect, method:
+        case "octave", "bisector":
+            return "Octave's bisector is the number of a sample, and here its value"
+        case "matlab", "bisector":
+            what = "MATLAB's bisector is the first sample with half of the area"
+            return f"{what}, and here the nearest to it"
+        case "matlab", ("smallest of maximum" | "largest of maximum"):
+            size = method.partition(" ")[0]
+            word = {"smallest": "som", "largest": "lom"}[size]
+            what = f"MATLAB's {word} is the value of the {size} size"
+            is_same = low is not None and low >= 0.0
+            return None if is_same else f"{what}, and here the {size} value"
+        case _:
+            return None
 
 
 FIS_KINDS: Final[FunctionWords] = function_words("fis", "fuzzylite_fis")
