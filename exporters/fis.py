@@ -206,8 +206,8 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
         if how.method != first.defuzzifier.method:
             what = f"{how.method} becomes {first.defuzzifier.method}, as of the first"
             yield Loss(where, what)
-        if what := method_loss(how.method, output.low, dialect):
-            yield Loss(where, what)
+        if lost := method_loss(how.method, output.low, dialect):
+            yield Loss(where, lost)
         whose = f"FIS does not say so; {dialect} takes"
         yield from grid_losses(output, DEFAULTS[dialect], whose)
         if output.aggregation != first.aggregation:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 from msgspec.structs import replace
@@ -13,7 +13,7 @@ from fuzzytree.runtimes import run_system
 from fuzzytree.semantics import Aim, range_rows, system_probes
 
 _ROWS = 200  # of each kind: on landmarks, drawn evenly, and aimed at rules
-_AGREEMENT = 1e-9  # relative; engines of one meaning are as near in our tests
+_AGREEMENT = 1e-9  # of the largest number; engines of one meaning are nearer in tests
 
 
 def with_answers(reading: Reading, read: Callable[..., Reading]) -> Reading:
@@ -26,60 +26,58 @@ def with_answers(reading: Reading, read: Callable[..., Reading]) -> Reading:
         reading: What was read of a file that names no dialect.
         read: Reads the same file in another `dialect`.
     """
+    system = reading.model
+    if not isinstance(system, FuzzySystem):
+        return reading
     losses, remarks = list(reading.losses), list(reading.remarks)
+    values = _values(system)
+    answers = _outputs(system, values)
     for dialect in reading.rivals:
         try:
             rival = read(dialect=dialect)
         except ReadError:
             continue  # that engine refuses the file
-        first, second = reading.model, rival.model
-        if not isinstance(first, FuzzySystem) or not isinstance(second, FuzzySystem):
+        other = rival.model
+        if not isinstance(other, FuzzySystem) or other == system:
             continue
-        outputs = [
-            replace(output, defuzzifier=other.defuzzifier)
-            for output, other in zip(second.outputs, first.outputs, strict=True)
+        sampled = [
+            replace(theirs, defuzzifier=ours.defuzzifier)
+            for theirs, ours in zip(other.outputs, system.outputs, strict=True)
         ]
-        alike = replace(second, outputs=tuple(outputs))
-        systems = {reading.dialect: first, rival.dialect: second}
-        if place := _place(first, alike):
-            losses.append(Loss("engines", _sentence(systems, *place)))
-        elif place := _place(first, second):
-            sentence = _sentence(systems, *place)
+        alike = replace(other, outputs=tuple(sampled))
+        others = _outputs(other, values)
+        meant = answers if alike == system else _outputs(alike, values)
+        place = _place(answers, meant) or _place(answers, others)
+        if place is None:
+            continue
+        output, row = place
+        point = zip(system.inputs, values[:, row].tolist(), strict=True)
+        sentence = (
+            f"{system.outputs[output].name} is {answers[place]:.9g} in "
+            f"{reading.dialect} and {others[place]:.9g} in {rival.dialect} at "
+            f"{', '.join(f'{name} = {value!r}' for name, value in point)}; "
+            f"pass --from {reading.dialect} or --from {rival.dialect}"
+        )
+        if _place(answers, meant):
+            losses.append(Loss("engines", sentence))
+        else:
             remarks.append(f"engines sample ranges otherwise: {sentence}")
     return replace(reading, losses=tuple(losses), remarks=tuple(remarks))
 
 
-def _place(first: FuzzySystem, second: FuzzySystem) -> tuple[int, FloatArray] | None:
-    """Return the output and the values at which two systems differ most, if they do.
+def _place(ours: FloatArray, theirs: FloatArray) -> tuple[int, int] | None:
+    """Return the output and the row in which numbers differ most, if they do.
 
-    Rows to which one of them has no number are left out: it is no answer.
+    Rows for which one of them has no number are left out: it is no answer.
     """
-    if first == second:
-        return None
-    values = _values(first)
-    answers = [_outputs(system, values) for system in (first, second)]
-    apart = np.abs(answers[0] - answers[1]) / np.maximum(np.abs(answers[0]), 1.0)
-    apart = np.where(np.isfinite(apart), apart, 0.0)
+    with np.errstate(invalid="ignore"):  # of infinite numbers
+        apart = np.nan_to_num(np.abs(ours - theirs), posinf=0.0)
+    sizes = np.nan_to_num(np.abs(ours), posinf=0.0).max(axis=1, initial=0.0)
+    apart /= np.where(sizes > 0.0, sizes, 1.0).reshape(-1, 1)
     if not apart.size or apart.max() <= _AGREEMENT:
         return None
     output, row = np.unravel_index(apart.argmax(), apart.shape)
-    return int(output), values[:, [row]]
-
-
-def _sentence(
-    systems: Mapping[str, FuzzySystem], output: int, values: FloatArray
-) -> str:
-    """Return what dialects of a file answer to one row, and how to choose one."""
-    answers = [
-        f"{_outputs(system, values)[output, 0]:.9g} in {name}"
-        for name, system in systems.items()
-    ]
-    system, *_ = systems.values()
-    row = zip(system.inputs, values[:, 0].tolist(), strict=True)
-    point = ", ".join(f"{name} = {value!r}" for name, value in row)
-    choice = " or ".join(f"--from {name}" for name in systems)
-    name = system.outputs[output].name
-    return f"{name} is {' and '.join(answers)} at {point}; pass {choice}"
+    return int(output), int(row)
 
 
 def _outputs(system: FuzzySystem, values: FloatArray) -> FloatArray:

@@ -672,8 +672,8 @@ def test_the_named_engine_is_the_one_that_a_rule_is_read_for(call: Call) -> None
         "  line 10: a OR b AND c is read as a OR (b AND c), as in the standard; "
         "jFuzzyLogic reads (a OR b) AND c; write parentheses, or pass --from fcl:iec "
         "or --from fcl:jfuzzylogic\n"
-        "  engines: y is 3.39844278 in fcl:iec and 0 in fcl:jfuzzylogic at "
-        "a = 0.03518, c = 0.4663, d = 0.0; pass --from fcl:iec or "
+        "  engines: y is 50 in fcl:iec and 0 in fcl:jfuzzylogic at "
+        "a = 1.0, c = 0.4, d = 0.0; pass --from fcl:iec or "
         "--from fcl:jfuzzylogic\n"
         "  pass --allow-loss to read it as stated\n",
     )

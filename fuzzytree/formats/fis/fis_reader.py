@@ -107,10 +107,11 @@ def read_fis(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
 def _dialect(page: text.FisFile, wanted: Dialect | None, notes: ReaderNotes) -> Dialect:
     """Return whose file it is; say why, or what contradicts the wanted dialect."""
     signs = list(_signs(page))
+    if not signs:
+        signs.append(("matlab", "nothing says otherwise", 0))
+        notes.rivals.extend(() if wanted else ("octave", "fuzzylite"))
     if wanted is None:
-        if not signs:
-            notes.rivals.extend(("octave", "fuzzylite"))
-        result, why, _ = [*signs, ("matlab", "nothing says otherwise", 0)][0]
+        result, why, _ = signs[0]
         notes.remark(f"read as {result}'s: {why}")
         return result
     for known, why, line in signs:
@@ -372,8 +373,8 @@ def _output(
     is_joined = not how.is_weighted or (
         dialect == "octave" and methods.aggregation != "sum"
     )
-    if what := words.method_loss(how.method, low, dialect):
-        notes.loss(f"output {name!r}", what)
+    if lost := words.method_loss(how.method, low, dialect):
+        notes.loss(f"output {name!r}", lost)
     return SystemOutput(
         name,
         labels,
