@@ -81,7 +81,7 @@ def _place(ours: FloatArray, theirs: FloatArray) -> tuple[int, int] | None:
 
 
 def _outputs(system: FuzzySystem, values: FloatArray) -> FloatArray:
-    outputs = run_system(system)(values).outputs
+    outputs = run_system(system, with_strengths=False)(values).outputs
     assert outputs is not None  # a system has some; for type checkers
     return outputs
 

@@ -26,7 +26,8 @@ class ShowOptions(ResultOptions):
 
     model: str = model_argument()
     picture: str | None = output_option(
-        "--picture FILE", "Picture of the tree to write, as .svg or .png."
+        "--picture FILE",
+        "Picture of the tree, or of the terms of rules, as .svg or .png.",
     )
 
 
@@ -48,7 +49,7 @@ def command(options: ShowOptions) -> None:
     if Path(options.model).suffix.lower() == ".onnx":
         if options.picture is not None:
             raise click.UsageError(
-                f"--picture: {options.model} contains a graph and no tree"
+                f"--picture: {options.model} contains a graph and no model"
             )
         opened = api.opened(options.model)
         assert isinstance(opened, OnnxModel)
@@ -78,12 +79,11 @@ def _draw(model: Document, picture: str) -> None:
     from fuzzytree import report
     from fuzzytree.model import FuzzyTree
 
-    if not isinstance(model, FuzzyTree):
-        raise click.UsageError(
-            f"--picture: {model.name} is no tree; rules have none to draw"
-        )
     with wrong_options():
-        report.draw_tree(model).save(picture)
+        if isinstance(model, FuzzyTree):
+            report.draw_tree(model).save(picture)
+        else:
+            report.draw_terms(model).save(picture)
 
 
 def _facts(found: Reading) -> dict[str, object]:

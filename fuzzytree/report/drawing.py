@@ -20,6 +20,7 @@ from fuzzytree.model import (
     Points,
     RuleBase,
     Shape,
+    SystemOutput,
     Term,
     Variable,
     printable,
@@ -94,7 +95,7 @@ def axes_of(
     """Return every input and combination of a model as it is drawn, by name."""
     variables = model.variables
     axes: dict[str, Axis] = {}
-    for axis in map(_axis, variables):
+    for axis in map(axis_of, variables):
         side = domain.side(axis.name)
         if side is not None:
             axes[axis.name] = axis._replace(low=side.low, high=side.high)
@@ -119,16 +120,21 @@ def _reached(
     return (low, high) if is_known else (None, None)
 
 
-def _axis(variable: Variable) -> Axis:
+def axis_of(variable: Variable | SystemOutput) -> Axis:
+    """Return a variable or an output as it is drawn, on its own range."""
     is_undrawn = {
         term.name: isinstance(term.function, (Linear, Formula))
         for term in variable.terms
     }
     curves = tuple(_labelled(t) for t in variable.terms if not is_undrawn[t.name])
     others = tuple(name for name, is_left in is_undrawn.items() if is_left)
-    return Axis(
-        variable.name, variable.unit, curves, others, None, None, variable.parts
-    )
+    ends = variable.low, variable.high
+    if isinstance(variable, SystemOutput):
+        return Axis(variable.name, variable.unit, curves, others, *ends)
+    if variable.categories:
+        ends = 0.0, len(variable.categories) - 1.0
+    parts = variable.parts
+    return Axis(variable.name, variable.unit, curves, others, *ends, parts)
 
 
 def curve_of(name: str, shape: Shape) -> Curve:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from fuzzytree.auditing import Span
+from fuzzytree.model import Document, SystemOutput, Variable
 from fuzzytree.report.audit_rows import Data, histogram
 from fuzzytree.report.drawing import (
     LETTER,
@@ -15,12 +17,15 @@ from fuzzytree.report.drawing import (
     Curve,
     Scale,
     axis_marks,
+    axis_of,
     between,
     cut,
     polyline,
     spread,
 )
 from fuzzytree.report.markup import Markup, mark
+from fuzzytree.report.models import sum_text
+from fuzzytree.report.pictures import Picture, picture
 from fuzzytree.report.svg_tree import class_mark
 from fuzzytree.report.text import number
 
@@ -37,6 +42,18 @@ _ROW = 14.0  # of names above it
 _MOST_ROWS = 3
 _BINS = 36
 _FONT = 11.0
+_ACROSS = 3  # variables beside each other in a picture of their own
+_GAP, _LINE = 12.0, 16.0
+_PANEL = 8.0 + _ROW * _MOST_ROWS + _PLOT + 22.0  # at most, of one variable
+_LETTERS = 58  # of a line of words above it
+_STYLE = """
+svg .term { font-size: 11px; }
+.curve { fill: none; stroke: #1b1c1e; stroke-width: 1.7; stroke-linejoin: round; }
+.axis, .tick { stroke: #595d66; }
+.lead { stroke: #c9ccd3; }
+.outside { fill: #eceef2; }
+.domain { stroke: #595d66; stroke-dasharray: 1 3; stroke-width: 1.5; }
+"""
 
 
 def scale_of(axis: Axis, data: Data | None) -> Scale:
@@ -105,6 +122,55 @@ def terms_picture(
         domain = f"; the domain is {number(axis.low)} to {number(axis.high)}"
     about = f"Degrees from 0 to 1 over the values{domain}; terms: {terms}"
     return mark("svg", WIDE, high, name, title, about, parts)
+
+
+def draw_terms(model: Document) -> Picture:
+    """Draw the terms of each variable of a model, and those of a system's outputs.
+
+    Raises:
+        ValueError: If the model has no terms that are curves.
+
+    Example:
+        >>> from fuzzytree.testing import random_system
+        >>> draw_terms(random_system(2)).svg.startswith("<svg")
+        True
+    """
+    marks: list[Markup] = []
+    left = high = top = wide = 0.0
+    variables: list[Variable | SystemOutput] = [*model.variables, *model.outputs]
+    for axis, variable in zip(map(axis_of, variables), variables, strict=True):
+        if not axis.curves:
+            continue
+        notes = [axis.title, *_note_texts(variable, axis)]
+        drawn = terms_picture(axis, None, f"v{len(marks)}")
+        words = [
+            mark("words", 0.0, _LINE * k, note, "small" if k > 1 else "strong")
+            for k, note in enumerate(notes, 1)
+        ]
+        below = _LINE * (len(notes) + 0.5)
+        words.append(mark("group", [drawn], move=f"translate(0 {below:.1f})"))
+        move = f"translate({left + _GAP:.0f} {top + _GAP:.0f})"
+        marks.append(mark("group", words, move=move))
+        high = max(high, top + below + _PANEL)
+        wide = max(wide, left + WIDE + 2 * _GAP)
+        left += WIDE + 2 * _GAP
+        if left >= _ACROSS * (WIDE + 2 * _GAP):
+            left, top = 0.0, high
+    if not marks:
+        raise ValueError(f"{model.name} has no terms that are curves")
+    return picture(marks, wide, high + _GAP, f"The terms of {model.name}", _STYLE)
+
+
+def _note_texts(variable: Variable | SystemOutput, axis: Axis) -> Iterator[str]:
+    """Yield what a picture of terms does not show, in lines of their own."""
+    categories = () if isinstance(variable, SystemOutput) else variable.categories
+    words = [f"{place} is {name}" for place, name in enumerate(categories)]
+    texts = [", ".join(words)] if words else []
+    texts += [f"{axis.name} = {sum_text(axis.parts)}"] if axis.parts else []
+    if axis.undrawn:
+        texts.append(f"not drawn: {', '.join(axis.undrawn)}")
+    for text in texts:
+        yield from textwrap.wrap(text, _LETTERS)
 
 
 def _curves(

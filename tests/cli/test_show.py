@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
+import fuzzytree as ft
 from fuzzytree.model.rulebase import LR, Band, Points, Shape, Side, fingerprint
 from fuzzytree.model.tree import FuzzyTree, Leaf
 from fuzzytree.report.models import curve_text, model_lines
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 from tests.cli.conftest import Call, grip
 
 RULES = """\
@@ -144,13 +145,29 @@ def test_a_picture_of_a_tree_is_written_beside_its_words(call: Call, name: str) 
     assert Path(name).stat().st_size > 1000
 
 
-def test_what_has_no_tree_has_no_picture(call: Call) -> None:
-    code, _, err = call("show", "rules.yaml", "--picture", "no.svg")
-    assert code == 2
-    assert err.startswith("--picture: grip is no tree; rules have none to draw\n")
+def test_a_picture_of_rules_shows_the_terms_of_each_variable(call: Call) -> None:
+    code, _, _ = call("show", "rules.yaml", "--picture", "terms.svg")
+    assert code == 0
+    drawn = Path("terms.svg").read_text("utf-8")
+    rules = ft.load("rules.yaml")
+    for variable in rules.variables:
+        for term in variable.terms:
+            assert f"<title>{term.name}</title>" in drawn
+
+
+def test_a_picture_of_a_system_shows_its_outputs_too(call: Call) -> None:
+    ft.save(random_system(2), "system.yaml")
+    code, _, _ = call("show", "system.yaml", "--picture", "terms.svg")
+    assert code == 0
+    drawn = Path("terms.svg").read_text("utf-8")
+    for output in ft.load("system.yaml").outputs:
+        assert f">The terms of {output.name}" in drawn
+
+
+def test_a_graph_has_no_picture(call: Call) -> None:
     code, _, err = call("show", "grip.onnx", "--picture", "no.svg")
     assert code == 2
-    assert err.startswith("--picture: grip.onnx contains a graph and no tree\n")
+    assert err.startswith("--picture: grip.onnx contains a graph and no model\n")
     assert not Path("no.svg").exists()
 
 
