@@ -989,7 +989,7 @@ def stability(
     """Apply the criteria N1 to N10 to a model: is it numerically stable?
 
     Args:
-        model: A tree or a rule base, or the path of one.
+        model: A tree, a rule base or a fuzzy system, or the path of one.
         data: A table with rows of one's own, beside the probes.
         select: The codes of criteria, such as `N3`; all unless given.
         runtimes: The names of the runtimes; all that are installed unless given.
@@ -1005,7 +1005,7 @@ def stability(
         >>> stability(random_tree(1), runtimes=["native"], select=["N3", "N7"]).ok
         True
     """
-    first = _model_of(model, "stability")
+    first = checking.as_model(model)
     chosen = chosen_runtimes(runtimes)
     return checking.examine(
         first,

@@ -222,12 +222,12 @@ def _other_probabilities(actual: ModelRun, expected: ModelRun) -> BoolArray:
 def unequal(one: Outcome, two: Outcome) -> BoolArray:
     """Return the rows in which two outcomes differ, by a single bit if in no more."""
     wrong: BoolArray = (one.rule != two.rule) | (one.status != two.status)
-    first, second = one.strengths, two.strengths
-    if first is None or second is None:
-        return wrong
-    if first.shape != second.shape:
-        return np.ones_like(wrong)
-    wrong |= ~same_bits(first, second).all(axis=0)
+    for kind in ("strengths", "outputs"):
+        first, second = getattr(one, kind), getattr(two, kind)
+        if first is not None and second is not None:
+            if first.shape != second.shape:
+                return np.ones_like(wrong)
+            wrong |= ~same_bits(first, second).all(axis=0)
     return wrong
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from fuzzytree.checking import Criterion, CurveFault, OffsetCost, Stability, Stiff
 from fuzzytree.report.text import aligned, counted, first_lines, more_line, number
@@ -13,6 +13,7 @@ _SAFE = "float32 is safe"
 
 CRITERION = ("code", "stability check", "cases", "worst", "verdict")
 _STIFF = ("input", "spread/size", "float32 costs", "observed", "changed", "advice")
+_MOVE = ("input", "moved by", "answer moves by", "changed", "most at")
 _OFFSET = (
     "form",
     "spread/distance",
@@ -45,6 +46,7 @@ def stability_lines(study: Stability, *, is_verbose: bool = False) -> Iterator[s
         if is_verbose:
             yield from (f"{one.code}: not tried: {text}" for text in one.skipped)
     yield from _inputs(study, is_verbose=is_verbose)
+    yield from _move_lines(study.stiff, is_verbose=is_verbose)
     if is_verbose and study.offsets:
         yield from _offset_lines(study.offsets)
     faults = [one for one in study.curves if is_verbose or one.fails]
@@ -108,6 +110,24 @@ def _stiff_row(one: Stiff) -> tuple[str, ...]:
         flips,
         one.advice,
     )
+
+
+def _move_lines(inputs: Sequence[Stiff], *, is_verbose: bool) -> Iterator[str]:
+    """Yield how far answers move with an input, or the jumps of outputs alone."""
+    rows = [
+        (
+            one.input,
+            move.step,
+            f"{move.largest:.1e}{f' of the range of {move.output}' * bool(move.output)}",
+            f"{move.changed} of {one.rows}",
+            move.row or "-",
+        )
+        for one in inputs
+        for move in one.moves[: None if is_verbose else 1]
+        if is_verbose or (move.output and move.changed)
+    ]
+    if rows:
+        yield from aligned([_MOVE, *rows])
 
 
 def _offset_lines(costs: tuple[OffsetCost, ...]) -> Iterator[str]:

@@ -51,6 +51,7 @@ from .probing import Aim as Aim
 from .probing import Row as Row
 from .probing import few_probes as few_probes
 from .probing import landmarks as landmarks
+from .probing import landmarks_of as landmarks_of
 from .probing import neighbours as neighbours
 from .probing import probe_values as probe_values
 from .probing import probes as probes

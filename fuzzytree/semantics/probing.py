@@ -23,6 +23,7 @@ from fuzzytree.model import (
     Condition,
     Cosine,
     Curve,
+    Document,
     FloatArray,
     Formula,
     FuzzySystem,
@@ -132,13 +133,12 @@ def _spread(rows: Sequence[Row], count: int) -> list[Row]:
     return [rows[round(k * step)] for k in range(min(count, len(rows)))]
 
 
-def probe_values(
-    model: FuzzyTree | RuleBase, limit: int, *, seed: int = 0
-) -> FloatArray:
-    """Return the rows of `probes` as an array of shape (inputs, rows)."""
+def probe_values(model: Document, limit: int, *, seed: int = 0) -> FloatArray:
+    """Return the rows of `probes`, of a system `system_probes`, as (inputs, rows)."""
     import numpy as np
 
-    rows = probes(model, limit=limit, seed=seed)
+    make = system_probes if isinstance(model, FuzzySystem) else probes
+    rows = make(model, limit=limit, seed=seed)  # type: ignore[arg-type] # as chosen
     table = np.array([[row[n] for row in rows] for n in model.inputs], np.float64)
     return table.reshape(len(model.inputs), len(rows))
 
@@ -273,7 +273,7 @@ class Aim:
         one = self._inputs[variable]
         if not one.parts:
             return self._points[variable]
-        numbers = [x for label in one.terms for x in numbers_of(label.function)]
+        numbers = [x for label in one.terms for x in landmarks_of(label.function)]
         return numbers or [0.0, 1.0]
 
     def _ends(self, variable: str) -> Interval:
@@ -320,7 +320,7 @@ def _system_points(system: FuzzySystem) -> dict[str, list[float]]:
     points: dict[str, list[float]] = {name: [] for name in system.inputs}
     for one in system.variables:
         ends = [end for end in (one.low, one.high) if end is not None]
-        own = [value for label in one.terms for value in numbers_of(label.function)]
+        own = [value for label in one.terms for value in landmarks_of(label.function)]
         inner = [a + 0.5 * (b - a) for a, b in itertools.pairwise(sorted(set(own)))]
         if not one.parts:
             points[one.name] += [*ends, *own, *filter(math.isfinite, inner)]
@@ -329,13 +329,15 @@ def _system_points(system: FuzzySystem) -> dict[str, list[float]]:
     return {name: values or [0.0, 1.0] for name, values in points.items()}
 
 
-def numbers_of(curve: Curve) -> list[float]:
+def landmarks_of(curve: Curve) -> list[float]:
     """Return the values at which a system's curve may change its formula.
 
     Example:
         >>> from fuzzytree.model import Gaussian, Trapezoid
-        >>> numbers_of(Trapezoid(None, 1.0, 2.0, 4.0)), numbers_of(Gaussian(5.0, 2.0))
-        ([1.0, 2.0, 4.0], [5.0, 3.0, 7.0])
+        >>> landmarks_of(Trapezoid(None, 1.0, 2.0, 4.0))
+        [1.0, 2.0, 4.0]
+        >>> landmarks_of(Gaussian(5.0, 2.0))
+        [5.0, 3.0, 7.0]
     """
     match curve:
         case Band() | LR() | Points():
@@ -346,7 +348,7 @@ def numbers_of(curve: Curve) -> list[float]:
             SigmoidDifference(first=first, second=second)
             | SigmoidProduct(first=first, second=second)
         ):
-            return [*numbers_of(first), *numbers_of(second)]
+            return [*landmarks_of(first), *landmarks_of(second)]
         case Bell(center=middle, width=width) | Gaussian(mean=middle, deviation=width):
             results = [middle, middle - width, middle + width]
         case Cosine(center=middle, width=width) | Spike(center=middle, width=width):

@@ -10,18 +10,20 @@ from fuzzytree.checking.stability.results import Criterion, OffsetCost, Trial
 from fuzzytree.checking.stability.runs import (
     ExactCheck,
     FirstOutcomes,
+    Truth,
     exact_check,
     first_line,
+    forms_of,
     loaded_form,
     loaded_forms,
     other_bits,
+    truth,
 )
-from fuzzytree.checking.stability.sensitivity import InputScale, input_scales
+from fuzzytree.checking.stability.sensitivity import input_scales
 from fuzzytree.checking.stability.transforms import moved
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model import Dtype, FloatArray, Model, Runtime
-from fuzzytree.numerics import Decisions, decide
-from fuzzytree.semantics import forms, probe_values
+from fuzzytree.model import Document, Dtype, FloatArray, Runtime
+from fuzzytree.semantics import probe_values
 
 _ADVICE = (
     "the runtime computes something else, or in another number type than it says; "
@@ -30,9 +32,9 @@ _ADVICE = (
 
 
 def exactness(
-    model: Model, runtimes: Sequence[Runtime], values: FloatArray
+    model: Document, runtimes: Sequence[Runtime], values: FloatArray
 ) -> Criterion:
-    """Hold every runtime against the exact answers, within its bound (N8).
+    """Hold every runtime against the right answers, within its bound (N8).
 
     Runtimes of one number type that claim no bound of their own promise the same
     operations: they are compared with each other as well, bit for bit.
@@ -41,27 +43,28 @@ def exactness(
     rows of data, of shape (inputs, rows).
     """
     trial = Trial("N8", _ADVICE)
-    exact: dict[tuple[str, int], Decisions] = {}
+    right: dict[tuple[str, int], Truth] = {}
     checks: dict[str, list[ExactCheck]] = {}
     first: FirstOutcomes = {}
     for one in loaded_forms(model, runtimes, trial.skipped):
         rows = one.some(values)
         key = (one.representation, rows.shape[1])
-        if key not in exact:
-            exact[key] = decide(one.model, rows)
-        check = exact_check(one, rows, exact[key])
+        if key not in right:
+            right[key] = truth(one.model, rows)
+        check = exact_check(one, rows, right[key])
         trial.add(check.rows, *check.faults, worst=check.worst)
         trial.faults += other_bits(one, rows, check.outcome, first)
         own = f" in {one.runtime.name}" if one.runtime.bound is not None else ""
         checks.setdefault(f"{one.runtime.dtype}{own}", []).append(check)
-    return trial.result(*(_fact(name, check) for name, check in checks.items()))
+    nouns = ("numbers", "statuses") if model.outputs else ("strengths", "classes")
+    return trial.result(*(_fact(name, check, *nouns) for name, check in checks.items()))
 
 
-def _fact(name: str, checks: Sequence[ExactCheck]) -> str:
+def _fact(name: str, checks: Sequence[ExactCheck], numbers: str, answers: str) -> str:
     worst = max(checks, key=lambda one: one.worst)
     flips = max(one.flips for one in checks)
-    text = f"{name}: strengths off by at most {worst.worst:.2g}"
-    text += f" where {worst.allowed:.2g} is allowed, classes changed: {flips}"
+    text = f"{name}: {numbers} off by at most {worst.worst:.2g}"
+    text += f" where {worst.allowed:.2g} is allowed, {answers} changed: {flips}"
     unbounded = max(one.unbounded for one in checks)
     if unbounded:
         text += f"; no bound in {unbounded}, beyond the type or near a step"
@@ -81,14 +84,15 @@ _ADVICE_OFFSETS = (
 
 
 def offsets(
-    model: Model, runtimes: Sequence[Runtime], data: FloatArray
+    model: Document, runtimes: Sequence[Runtime], data: FloatArray
 ) -> tuple[Criterion, tuple[OffsetCost, ...]]:
     """Move every input until its narrowest term is 1e-1 to 1e-12 of its distance (N2).
 
     The moved model is a model of its own, whose numbers are rounded once. A runtime is
-    compared with its exact predictions, on probes of its edges and on moved data.
+    compared with its right predictions, on probes of its edges and on moved data.
 
-    There may be no rows of data. Slow runtimes get a share of the rows.
+    There may be no rows of data. Slow runtimes get a share of the rows; those with a
+    bound of their own promise nothing far from zero and are left out.
 
     Returns:
         The criterion, and what each distance costs in each number type.
@@ -97,65 +101,49 @@ def offsets(
     costs: list[OffsetCost] = []
     scales = input_scales(model, data)
     rows = data[:, :: max(-(-data.shape[1] // _DATA), 1)]
-    for representation, form in forms(model).items():
+    chosen = [runtime for runtime in runtimes if runtime.bound is None]
+    refused: set[str] = set()  # the first distance at which a type gives up is enough
+    for representation, form in forms_of(model).items():
         for ratio in RATIOS:
-            steps = {name: _step(scale, ratio) for name, scale in scales.items()}
+            steps = {
+                name: one.spread / ratio - (0.5 * one.low + 0.5 * one.high)
+                if np.isfinite(one.spread)
+                else 0.0
+                for name, one in scales.items()
+            }
             try:
                 far = moved(form, steps)
             except InvalidModelError as error:
                 why = f"{representation} at {ratio:.0e}: {first_line(error)}"
                 trial.skipped.append(why)
                 continue
-            away = rows + np.array([steps[name] for name in model.inputs]).reshape(
-                -1, 1
-            )
+            away = rows + np.array([*steps.values()]).reshape(-1, 1)
             values = np.concatenate([probe_values(far, _PROBES), away], axis=1)
-            checks = _observed(
-                representation, far, runtimes, values, trial.skipped, ratio
-            )
-            for one, _ in checks:
-                trial.add(
-                    one.rows,
-                    *(f"spread over distance {ratio:.0e}: {f}" for f in one.faults),
-                    worst=one.worst,
-                )
+            right = truth(far, values)
+            checks: list[tuple[ExactCheck, Dtype]] = []
+            for runtime in chosen:
+                lost: list[str] = []
+                one = loaded_form(representation, far, runtime, lost)
+                for text in (
+                    lost if runtime.name + representation not in refused else ()
+                ):
+                    refused.add(runtime.name + representation)
+                    head, _, why = text.rpartition(": ")
+                    trial.skipped.append(
+                        f"{head}: spread over distance {ratio:.0e}: {why}"
+                    )
+                if one is None:
+                    continue
+                some = one.some(values)
+                known = right if some.shape == values.shape else None
+                check = exact_check(one, some, known)
+                where = f"spread over distance {ratio:.0e}"
+                faults = (f"{where}: {fault}" for fault in check.faults)
+                trial.add(check.rows, *faults, worst=check.worst)
+                checks.append((check, runtime.dtype))
             if ratio in _REPORTED and representation != "tree":
                 costs.append(_cost(representation, ratio, checks, values.shape[1]))
     return trial.result(), tuple(costs)
-
-
-def _step(scale: InputScale, ratio: float) -> float:
-    """Return what takes the middle of an input to its spread over a ratio."""
-    if not np.isfinite(scale.spread):
-        return 0.0
-    return scale.spread / ratio - (0.5 * scale.low + 0.5 * scale.high)
-
-
-def _observed(
-    representation: str,
-    form: Model,
-    runtimes: Sequence[Runtime],
-    values: FloatArray,
-    skipped: list[str],
-    ratio: float,
-) -> list[tuple[ExactCheck, Dtype]]:
-    lost: list[str] = []
-    exact = decide(form, values)
-    checks: list[tuple[ExactCheck, Dtype]] = []
-    for runtime in runtimes:
-        if runtime.bound is not None:
-            continue  # its bound covers points and lines, not its arithmetic at 1e12
-        one = loaded_form(representation, form, runtime, lost)
-        if one is not None:
-            some = one.some(values)
-            same = exact if some.shape == values.shape else None
-            checks.append((exact_check(one, some, same), runtime.dtype))
-    named = {text.partition(": spread")[0] for text in skipped}
-    for text in lost:  # the first distance at which a type gives up is enough
-        name = ": ".join(text.split(": ")[:2])
-        if name not in named:
-            skipped.append(f"{name}: spread over distance {ratio:.0e}: {text}")
-    return checks
 
 
 def _cost(
@@ -167,13 +155,12 @@ def _cost(
     def largest(dtype: Dtype) -> float | None:
         return max((one.largest for one, kind in checks if kind == dtype), default=None)
 
-    flips = max((one.flips for one, kind in checks if kind == "float32"), default=0)
     return OffsetCost(
         representation,
         ratio,
         largest("float32"),
         largest("mixed"),
         largest("float64"),
-        flips,
+        max((one.flips for one, kind in checks if kind == "float32"), default=0),
         rows,
     )

@@ -77,6 +77,24 @@ class OffsetCost(msgspec.Struct, frozen=True):
     rows: int
 
 
+class Move(msgspec.Struct, frozen=True):
+    """How far the answers of a model move when one input does.
+
+    Attributes:
+        step: By how much the input moves.
+        largest: The most that a strength moved, or an output, as a share of its range.
+        changed: Rows whose class changed, or an output by more than 1e-4 of its range.
+        output: The output that moved most; empty without one.
+        row: The row in which that was, if any changed.
+    """
+
+    step: str
+    largest: float
+    changed: int
+    output: str
+    row: str
+
+
 class Stiff(msgspec.Struct, frozen=True):
     """How stiff an input is, and what giving it in float32 would cost.
 
@@ -88,11 +106,13 @@ class Stiff(msgspec.Struct, frozen=True):
         ratio: spread / location: small is stiff. None where one of them is missing.
         predicted: The largest error of a degree that rounding this input alone to
             float32 can cause, from the slopes of the terms; at most 1.
-        observed: The largest change of a strength that it did cause, on the rows.
-        flips: Rows whose exact class changes with it.
+        observed: The largest change of a strength that it did cause, on the rows, or
+            of an output, as a share of its range.
+        flips: Rows whose class changes with it, or an output by more than 1e-4.
         rows: How many rows were tried.
         offset: A value to subtract before rounding that would help, if one would.
         advice: `float32 is safe`, `use mixed`, `use double`, and what to subtract.
+        moves: How far answers move for the least and a small move of the input.
     """
 
     input: str
@@ -105,6 +125,7 @@ class Stiff(msgspec.Struct, frozen=True):
     rows: int
     offset: float | None
     advice: str
+    moves: tuple[Move, ...] = ()
 
 
 class CurveFault(msgspec.Struct, frozen=True):

@@ -5,29 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, cast, get_args
 
-from fuzzytree.checking.comparing import strength_gap, unequal
+import msgspec
+
+from fuzzytree.checking.comparing import strength_gap
 from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.checking.stability.results import Criterion, Trial
-from fuzzytree.checking.stability.runs import first_line
+from fuzzytree.checking.stability.runs import first_line, forms_of, loaded_form
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.model import (
+    Document,
     Dtype,
     FloatArray,
     Format,
-    FuzzyTree,
-    Model,
     Run,
     kind_of,
     options_of,
 )
 from fuzzytree.runtimes import baseline, load_content, open_onnx
-from fuzzytree.semantics import forms
 
 _ADVICE = "keep the YAML file as the model, and do not ship the file that failed"
 
 
 def roundtrips(
-    model: Model, formats: Sequence[Format], values: FloatArray
+    model: Document, formats: Sequence[Format], values: FloatArray
 ) -> Criterion:
     """Write every form of a model in every format, take it back and compare (N9).
 
@@ -38,7 +38,7 @@ def roundtrips(
     The values, of shape (inputs, rows), are what files that run compute.
     """
     trial = Trial("N9", _ADVICE, worst=0.0)
-    for representation, form in forms(model).items():
+    for representation, form in forms_of(model).items():
         for one in formats:
             title = f"{one.name}: {representation}"
             if kind_of(form) not in one.carries:
@@ -55,7 +55,7 @@ def roundtrips(
     return trial.result()
 
 
-def _read_again(trial: Trial, one: Format, title: str, form: Model) -> None:
+def _read_again(trial: Trial, one: Format, title: str, form: Document) -> None:
     assert one.read is not None  # the caller tests it
     written = one.write(form)
     try:
@@ -69,7 +69,7 @@ def _read_again(trial: Trial, one: Format, title: str, form: Model) -> None:
             trial.add(2)
         case "equal":
             trial.add(1, f"{title}: written again it has other bytes")
-        case "alike" if not isinstance(form, FuzzyTree):
+        case "alike" if form.rules:
             trial.add(1)
         case _:
             why = f"{title}: the model that comes back is not equal"
@@ -77,34 +77,35 @@ def _read_again(trial: Trial, one: Format, title: str, form: Model) -> None:
 
 
 def _run_again(
-    trial: Trial, one: Format, representation: str, form: Model, values: FloatArray
+    trial: Trial, one: Format, representation: str, form: Document, values: FloatArray
 ) -> None:
     """Run a file in each of its number types beside the native runtime."""
     known = {fact.name for fact in options_of(one)}
-    wanted: dict[str, object] = {"outputs": ("label", "rule", "status", "strengths")}
-    if isinstance(form, FuzzyTree):
-        wanted = {"outputs": ("label", "rule", "status")}
+    outputs = ["label", "rule", "status", *["strengths"] * bool(form.rules)]
+    if form.outputs:
+        outputs = ["outputs", "status", "activations"]
     for dtype in get_args(Dtype) if "dtype" in known else ("float64",):
         title = f"{one.name} {dtype}: {representation}"
-        options = {k: v for k, v in {"dtype": dtype, **wanted}.items() if k in known}
+        native = loaded_form(representation, form, baseline(dtype), [])
+        wanted = {"dtype": dtype, "outputs": tuple(outputs)}
+        options = {name: wanted[name] for name in known & wanted.keys()}
         write = cast("Callable[..., Any]", one.write)  # the options are its own
         try:
-            run = _RUNS[one.name](write(form, **options).content, form)
-            expected = baseline(dtype).load(form)(values)
+            content = None if native is None else write(form, **options).content
         except LossError as error:
             trial.skipped.append(f"{title}: {first_line(error)}")
             continue
-        actual = run(values)
-        wrong = unequal(actual, expected)
+        if native is None or content is None:
+            trial.skipped.append(f"{title}: no native runtime computes it")
+            continue
+        actual, expected = _RUNS[one.name](content, form)(values), native.run(values)
         gap = float(strength_gap(actual, expected).max(initial=0.0))
-        fault = (
-            f"{title}: {int(wrong.sum())} of {wrong.size} rows are answered "
-            f"differently, strengths by up to {gap:.3g}"
-        )
-        trial.add(wrong.size, fault if wrong.any() else None, worst=gap)
+        what = f": {{}}, strengths by up to {gap:.3g}"
+        file = msgspec.structs.replace(native, title=title)
+        trial.add(*file.fault(what, values, actual, expected), worst=gap)
 
 
-_RUNS: dict[str, Callable[[bytes, Model], Run]] = {
+_RUNS: dict[str, Callable[[bytes, Any], Run]] = {
     "onnx": lambda content, _: open_onnx(content, "the written file").run,
     "python": load_content,
 }

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.comparing import unequal
 from fuzzytree.checking.stability.results import Criterion, Trial, Usable
 from fuzzytree.checking.stability.runs import (
     FirstOutcomes,
     LoadedForm,
+    exact_check,
     loaded_form,
     loaded_forms,
     missing_rows,
@@ -21,9 +21,20 @@ from fuzzytree.checking.stability.runs import (
     row_text,
     run_with_warning,
 )
+from fuzzytree.checking.stability.sensitivity import input_scales
 from fuzzytree.checking.stability.transforms import NORMAL, exponent_range, scaled
 from fuzzytree.errors import InvalidModelError, LossError
-from fuzzytree.model import BoolArray, Dtype, FloatArray, Model, Outcome, Runtime
+from fuzzytree.model import (
+    BoolArray,
+    Document,
+    Dtype,
+    FloatArray,
+    IntArray,
+    Linear,
+    Outcome,
+    Run,
+    Runtime,
+)
 from fuzzytree.semantics import Status
 
 BATCHES = (1, 7, 33, 1000)
@@ -36,58 +47,58 @@ _ADVICE = (
 )
 
 
-def order(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Criterion:
+def order(
+    model: Document, runtimes: Sequence[Runtime], values: FloatArray
+) -> Criterion:
     """Permute, repeat and cut up rows, and reorder inputs; demand equal bits (N3)."""
     trial = Trial("N3", _ADVICE)
     for one in loaded_forms(model, runtimes, trial.skipped):
         rows = one.some(values)
         whole = one.run(rows)
-        for said, wrong in (*_tries(one, rows, whole), *_renumbered(one, rows, whole)):
-            fault = (
-                f"{one.title}: {int(wrong.sum())} of {wrong.size} rows are "
-                f"answered differently {said}"
-            )
-            trial.add(wrong.size, fault if wrong.any() else None)
+        for text, run, table, numbers in (*_tables(one, rows), *_renumbered(one, rows)):
+            right = whole.part(numbers)
+            what = f": {{}} {text}"
+            trial.add(*one.fault(what, rows[:, numbers], run(table), right))
     return trial.result()
 
 
-def _tries(
-    one: LoadedForm, rows: FloatArray, whole: Outcome
-) -> Iterator[tuple[str, BoolArray]]:
-    """Yield what was done to the rows, and which were then answered differently."""
-    count = rows.shape[1]
-    mixed = np.random.default_rng(0).permutation(count)
-    yield "in another order", unequal(one.run(rows[:, mixed]), whole.part(mixed))
-    twice = np.repeat(np.arange(count), 2)
-    yield (
-        "when each stands twice",
-        unequal(one.run(rows[:, twice]), whole.part(twice)),
-    )
+Attempt = tuple[str, Run, FloatArray, IntArray]
+"""What was done to the rows, what runs them, the table, and the rows' numbers."""
+
+
+def _tables(one: LoadedForm, rows: FloatArray) -> Iterator[Attempt]:
+    """Yield the rows in other orders, numbers and layouts of memory."""
+    every = np.arange(rows.shape[1])
+    mixed = np.random.default_rng(0).permutation(every)
+    yield "in another order", one.run, rows[:, mixed], mixed
+    twice = np.repeat(every, 2)
+    yield "when each stands twice", one.run, rows[:, twice], twice
     large = max(BATCHES)
-    if count < large and not one.runtime.is_slow:
-        many = np.resize(np.arange(count), large)
-        yield f"among {large}", unequal(one.run(rows[:, many]), whole.part(many))
+    if len(every) < large and not one.runtime.is_slow:
+        many = np.resize(every, large)
+        yield f"among {large}", one.run, rows[:, many], many
     for size in BATCHES:
-        starts = np.arange(0, count, size)
-        for start in starts[:: -(-len(starts) // _CALLS)] if size < count else ():
-            some = np.arange(start, min(start + size, count))
-            outcome = one.run(np.ascontiguousarray(rows[:, some]))
-            yield f"in a batch of {len(some)}", unequal(outcome, whole.part(some))
+        starts = range(0, len(every), size)
+        for start in starts[:: -(-len(starts) // _CALLS)] if size < len(every) else ():
+            some = every[start : start + size]
+            table = np.ascontiguousarray(rows[:, some])
+            yield f"in a batch of {len(some)}", one.run, table, some
+    yield "when rows are contiguous in memory", one.run, np.asfortranarray(rows), every
+    yield "when numbers are apart in memory", one.run, rows[:, twice][:, ::2], every
 
 
-def _renumbered(
-    one: LoadedForm, rows: FloatArray, whole: Outcome
-) -> Iterator[tuple[str, BoolArray]]:
-    """Yield the same for a model whose inputs stand in the opposite order."""
+def _renumbered(one: LoadedForm, rows: FloatArray) -> Iterator[Attempt]:
+    """Yield the rows for a model whose inputs stand in the opposite order."""
     inputs = [v for v in one.model.variables if not v.parts]
-    if len(inputs) < 2:
-        return
+    outputs = (term.function for output in one.model.outputs for term in output.terms)
+    if len(inputs) < 2 or any(isinstance(curve, Linear) for curve in outputs):
+        return  # a linear conclusion adds up its inputs in their order
     others = [v for v in one.model.variables if v.parts]
     turned = msgspec.structs.replace(one.model, variables=(*reversed(inputs), *others))
     after = loaded_form(one.representation, turned, one.runtime, [])
     if after is not None:
-        outcome = after.run(np.ascontiguousarray(rows[::-1]))
-        yield "when the inputs stand in another order", unequal(outcome, whole)
+        table, every = np.ascontiguousarray(rows[::-1]), np.arange(rows.shape[1])
+        yield "when the inputs stand in another order", after.run, table, every
 
 
 _STEPS = (-300, -40, -7, 7, 40, 300)  # and the ends of the range
@@ -101,7 +112,7 @@ _NO_INPUT = "the model has no input"
 
 
 def scaling(
-    model: Model, runtimes: Sequence[Runtime], values: FloatArray
+    model: Document, runtimes: Sequence[Runtime], values: FloatArray
 ) -> tuple[Criterion, tuple[Usable, ...]]:
     """Multiply the inputs of a model and of rows by 2**k; demand equal bits (N1).
 
@@ -140,7 +151,9 @@ def scaling(
     return trial.result(*facts), tuple(usable.values())
 
 
-def decades(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Criterion:
+def decades(
+    model: Document, runtimes: Sequence[Runtime], values: FloatArray
+) -> Criterion:
     """Spread the units of a model's inputs over 20 decades; demand equal bits (N2b).
 
     The inputs of one combination are spread as well.
@@ -203,14 +216,9 @@ def _tried(
         skipped.append(f"{one.title}, inputs times {said}: no row stays in range")
         return 0, None
     factors = np.array(ks, np.int64)[:, np.newaxis]
-    wrong = unequal(one.run(rows), after.run(np.ldexp(rows, factors)))
-    if not wrong.any():
-        return int(wrong.size), None
-    fault = (
-        f"{one.title}, inputs times {said}: {int(wrong.sum())} of {wrong.size} rows "
-        "are answered differently"
-    )
-    return int(wrong.size), fault
+    right = one.run(rows)
+    what = f", inputs times {said}: {{}}"
+    return one.fault(what, rows, after.run(np.ldexp(rows, factors)), right)
 
 
 def _is_normal(values: FloatArray, ks: Sequence[int], dtype: Dtype) -> BoolArray:
@@ -250,6 +258,10 @@ SPECIALS = (
 """No number, no finite one, both zeros, subnormal in double and in float32, the largest
 float32 and beyond, and the largest double."""
 
+_BEYOND = (0.5, 1.0, 4.0, 16.0, 21.0, 22.0, 22.5, 23.0, 24.0, 64.0, 1e3, 1e6)
+"""Distances from a range, in widths of the narrowest term: at some of them the degree
+of a gaussian is 1e-300, at others 0."""
+
 _BASES = 4  # rows in which a value is replaced
 _ADVICE_SPECIALS = (
     "test for missing values before anything is compared: NaN answers every comparison "
@@ -258,20 +270,20 @@ _ADVICE_SPECIALS = (
 
 
 def specials(
-    model: Model, runtimes: Sequence[Runtime], values: FloatArray
+    model: Document, runtimes: Sequence[Runtime], values: FloatArray
 ) -> Criterion:
     """Put each special value into each input; demand the declared answer (N6).
 
     A row is missing exactly where an input, or a combination computed step by step in
-    the runtime's type of axes, is not finite; then there is no rule, and no strength is
-    a number. -0.0 is answered like 0.0. Runtimes of one number type that promise equal
-    bits give each other's rules.
+    the runtime's type of axes, is not finite; then there is no rule, and no strength or
+    output is a number. For a class -0.0 is like 0.0. Runtimes of one number type that
+    promise equal bits give each other's rules; the numbers of a system are right.
     """
     trial = Trial("N6", _ADVICE_SPECIALS)
     if not model.inputs:
         trial.skipped.append(_NO_INPUT)
         return trial.result()
-    rows = _with_specials(values)
+    rows = _with_specials(model, values)
     first: FirstOutcomes = {}
     for one in loaded_forms(model, runtimes, trial.skipped):
         tried = one.some(rows)
@@ -279,28 +291,34 @@ def specials(
         trial.add(tried.shape[1], warning and f"{one.title}: it warns: {warning}")
         trial.faults += _broken_policy(one, tried, outcome)
         is_zero = tried == 0.0
-        if is_zero.any():
-            turned = np.where(is_zero, -tried, tried)
-            wrong = unequal(one.run(turned), outcome)
-            if wrong.any():
+        if model.outputs:  # a number may have the sign of an input
+            trial.faults += exact_check(one, tried).faults
+        elif is_zero.any():
+            turned = one.run(np.where(is_zero, -tried, tried))
+            if one.fault("", tried, turned, outcome)[1]:
                 trial.add(0, f"{one.title}: 0.0 and -0.0 are not answered alike")
         trial.faults += other_bits(one, tried, outcome, first)
     return trial.result()
 
 
-def _with_specials(values: FloatArray) -> FloatArray:
-    """Return rows in which one input at a time has each special value, and all have."""
+def _with_specials(model: Document, values: FloatArray) -> FloatArray:
+    """Return rows in which one input at a time has each special value, and all have.
+
+    The values beyond an input's range, where degrees end, are among them.
+    """
     plain = values[:, np.isfinite(values).all(axis=0)]
     if not plain.shape[1]:
         plain = np.zeros((values.shape[0], 1))
     bases = plain[:, :: -(-plain.shape[1] // _BASES)]
-    tables = [bases]
-    for value in SPECIALS:
-        for line in range(len(bases)):
+    tables = [bases, *(np.full_like(bases[:, :1], value) for value in SPECIALS)]
+    for line, scale in enumerate(input_scales(model, values).values()):
+        width = scale.spread if math.isfinite(scale.spread) else 0.0
+        beyond = [scale.high + size * width for size in _BEYOND]
+        beyond += [scale.low - size * width for size in _BEYOND]
+        for value in (*SPECIALS, *beyond):
             changed = bases.copy()
             changed[line] = value
             tables.append(changed)
-        tables.append(np.full_like(bases[:, :1], value))
     return np.concatenate(tables, axis=1)
 
 
@@ -319,9 +337,12 @@ def _broken_policy(
         )
     if (outcome.rule[is_missing] != 0).any():
         yield f"{one.title}: a row with a missing value has a rule"
-    if outcome.strengths is not None:
-        if not np.isnan(outcome.strengths[:, is_missing]).all():
-            yield f"{one.title}: a strength of a row with a missing value is a number"
+    for kind in ("strengths", "outputs"):
+        numbers = getattr(outcome, kind)
+        if numbers is not None and not np.isnan(numbers[:, is_missing]).all():
+            which = f"one of the {kind} of a row with a missing value"
+            yield f"{one.title}: {which} is a number"
+    if outcome.strengths is not None and not one.model.outputs:
         known = outcome.strengths[:, ~is_missing]
         if not ((known >= 0.0) & (known <= 1.0)).all():
             yield f"{one.title}: a strength is not between 0 and 1"

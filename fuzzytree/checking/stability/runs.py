@@ -1,9 +1,11 @@
-"""The forms of a model loaded in runtimes, and their distance from the exact degrees.
+"""The forms of a model loaded in runtimes, and their distance from what is right.
 
 A strength may differ from the exact one by `numerics.bounds.strength_bounds`, for the
 runtime's number type; a runtime with a bound of its own adds that to the one of double.
 A class may differ where the exact margin is at most twice the bound, and nowhere else;
-the path of a tree only in rows within rounding of a cut.
+the path of a tree only in rows within rounding of a cut. The numbers of a system are
+right as its definition computes them; a runtime may be as far from them as the
+functions of two libraries can take two runners (`semantics.programs.bounds`).
 """
 
 from __future__ import annotations
@@ -15,12 +17,14 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.comparing import ModelRun, exact_errors, unequal
+from fuzzytree.checking.comparing import ModelRun, exact_errors, same_bits, unequal
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
     BoolArray,
+    Document,
     Dtype,
     FloatArray,
+    FuzzySystem,
     Model,
     Outcome,
     RuleBase,
@@ -28,11 +32,34 @@ from fuzzytree.model import (
     Runtime,
     kind_of,
 )
-from fuzzytree.numerics import Decisions, decide, filled_values, strength_bounds
-from fuzzytree.runtimes import is_installed, needed_by
-from fuzzytree.semantics import forms
+from fuzzytree.numerics import Decisions, decide, strength_bounds
+from fuzzytree.runtimes import (
+    axis_lines,
+    baseline,
+    definition,
+    is_installed,
+    needed_by,
+    plan_axes,
+)
+from fuzzytree.semantics import error_bounds, forms, program_of
 
 _SLOW_ROWS = 60  # rows that a slow runtime is given, whatever the others get
+_EDGE = 1e-6  # share of an output's range; a wider bound says little
+
+Truth = Decisions | Outcome
+"""What is right for some rows: exact decisions, or the numbers of a system."""
+
+
+def forms_of(model: Document) -> dict[str, Document]:
+    """Return what can be made of a model, by the name that people call it."""
+    if isinstance(model, FuzzySystem):
+        return {"system": model}
+    return {title: form for title, form in forms(model).items()}
+
+
+def share(values: FloatArray) -> slice:
+    """Return which rows to run where each costs much: evenly drawn ones."""
+    return slice(None, None, max(-(-values.shape[1] // _SLOW_ROWS), 1))
 
 
 class LoadedForm(msgspec.Struct, frozen=True):
@@ -49,7 +76,7 @@ class LoadedForm(msgspec.Struct, frozen=True):
     title: str
     representation: str
     runtime: Runtime
-    model: Model
+    model: Document
     loud: Run
 
     def run(self, values: FloatArray) -> Outcome:
@@ -58,20 +85,33 @@ class LoadedForm(msgspec.Struct, frozen=True):
 
     def some(self, values: FloatArray) -> FloatArray:
         """Return the rows to run: a share of them if the runtime is slow."""
-        rows = values.shape[1]
-        if not self.runtime.is_slow or rows <= _SLOW_ROWS:
-            return values
-        return values[:, :: -(-rows // _SLOW_ROWS)]
+        return values[:, share(values)] if self.runtime.is_slow else values
+
+    def fault(
+        self, what: str, values: FloatArray, one: Outcome, two: Outcome
+    ) -> tuple[int, str | None]:
+        """Return how many rows two outcomes answer, and what is wrong if they differ.
+
+        Bits must be equal, but for what a library's functions change in a system.
+        """
+        wrong = unequal(one, two)
+        if wrong.any() and self.model.outputs:
+            gap, allowed = number_gaps(self.model, values, one, two)
+            wrong = np.asarray((gap > allowed).any(axis=0))
+        if not wrong.any():
+            return int(wrong.size), None
+        count = f"{int(wrong.sum())} of {wrong.size} rows are answered differently"
+        return int(wrong.size), f"{self.title}{what.format(count)}"
 
 
 def loaded_forms(
-    model: Model, runtimes: Sequence[Runtime], skipped: list[str]
+    model: Document, runtimes: Sequence[Runtime], skipped: list[str]
 ) -> Iterator[LoadedForm]:
     """Yield each form of a model in each runtime that can run it.
 
     `skipped` gets a sentence for each that is not installed or cannot.
     """
-    for representation, form in forms(model).items():
+    for representation, form in forms_of(model).items():
         for runtime in runtimes:
             loaded = loaded_form(representation, form, runtime, skipped)
             if loaded is not None:
@@ -79,11 +119,10 @@ def loaded_forms(
 
 
 def loaded_form(
-    representation: str, form: Model, runtime: Runtime, skipped: list[str]
+    representation: str, form: Document, runtime: Runtime, skipped: list[str]
 ) -> LoadedForm | None:
     """Return one form in one runtime; None if that cannot be, with a reason kept."""
-    kind = kind_of(form)
-    if kind not in runtime.runs:
+    if kind_of(form) not in runtime.runs:
         return None
     if not is_installed(runtime):
         skipped.append(f"{runtime.name} is not installed ({needed_by(runtime)})")
@@ -113,7 +152,7 @@ def other_bits(
     one: LoadedForm, rows: FloatArray, outcome: Outcome, first: FirstOutcomes
 ) -> Iterator[str]:
     """Yield where a runtime has other bits than the first one that promises them."""
-    if one.runtime.bound is None:
+    if one.runtime.bound is None and not one.model.outputs:
         key = (one.representation, one.runtime.dtype, one.runtime.is_slow)
         title, other = first.setdefault(key, (one.title, outcome))
         wrong = np.flatnonzero(unequal(outcome, other))
@@ -137,16 +176,16 @@ def row_text(inputs: Sequence[str], values: FloatArray, row: int) -> str:
 
 
 class ExactCheck(NamedTuple):
-    """How far a runtime was from the exact answers.
+    """How far a runtime was from the right answers.
 
     Attributes:
         rows: Rows that were run.
-        worst: The largest error of a strength that is certain, in rows with a bound; 0
-            for a tree.
+        worst: The largest error of a strength or output that is certain, in rows with
+            a bound; 0 for a tree.
         allowed: The bound in the row of that error.
         largest: The same in all rows.
-        flips: Rows whose class differs from the exact one.
-        unbounded: Rows in which the bound is 1 and proves nothing.
+        flips: Rows whose class, or whose status, differs from the right one.
+        unbounded: Rows in which the bound proves nothing.
         faults: What is beyond the bound, in sentences.
         outcome: What the runtime answered.
     """
@@ -161,47 +200,150 @@ class ExactCheck(NamedTuple):
     outcome: Outcome
 
 
+def truth(model: Document, values: FloatArray) -> Truth:
+    """Return what is right for rows.
+
+    The numbers of a system are those of its definition on a share of the rows, and
+    the native ones, which are compared with it there, on the others.
+    """
+    if not isinstance(model, FuzzySystem):
+        return decide(model, values)
+    right, some = baseline().load(model)(values), share(values)
+    inferred = definition().load(model)(values[:, some])
+    arrays = msgspec.structs.asdict(right)
+    for name in ("status", "strengths", "outputs"):
+        arrays[name] = np.array(arrays[name])
+        arrays[name][..., some] = getattr(inferred, name)
+    return Outcome(**arrays)
+
+
 def exact_check(
-    one: LoadedForm, values: FloatArray, exact: Decisions | None = None
+    one: LoadedForm, values: FloatArray, right: Truth | None = None
 ) -> ExactCheck:
-    """Run rows and compare the predictions with the exact ones.
+    """Run rows and compare the predictions with the right ones, if known already.
 
     Rows that are missing in the number type and not in double (beyond float32) are
     left to criterion N6.
-
-    `exact` has the exact answers to these rows, if they are known already.
     """
-    truth = decide(one.model, values) if exact is None else exact
+    right = truth(one.model, values) if right is None else right
     outcome = one.run(values)
-    dtype = one.runtime.dtype
-    known = ~missing_rows(one.model, values, dtype)
+    if isinstance(right, Outcome):
+        return _number_check(one, values, outcome, right)
+    model: Model = one.model  # type: ignore[assignment] # what has exact decisions
+    known = ~missing_rows(model, values, one.runtime.dtype)
     allowed = allowed_errors(one, values)
-    run = ModelRun(one.title, one.model, outcome)
-    errors = exact_errors(run, truth, values, dtype, allowed)
+    run = ModelRun(one.title, model, outcome)
+    errors = exact_errors(run, right, values, one.runtime.dtype, allowed)
     flips = errors.flips & known
     low = np.where(known, 0.0 if errors.low is None else errors.low, 0.0)
     wrong = flips & ~errors.close | (low > allowed)
-    bounded = np.where(allowed < 1.0, low, 0.0)
-    faults: list[str] = []
+    fault = None
     if wrong.any():
         row = int(np.flatnonzero(wrong)[np.argmax(low[wrong])])
         fault = f"rule {outcome.rule[row]} wins and another is right"
         if low[row] > allowed[row]:
             fault = f"strengths off by {low[row]:.3g}, {allowed[row]:.3g} allowed"
-        count = f"{int(wrong.sum())} of {wrong.size} rows are beyond the bound"
-        where = row_text(one.model.inputs, values, row)
-        faults.append(f"{one.title}: {count}: {fault}: {where}")
+        fault += f": {row_text(model.inputs, values, row)}"
+    is_open = known & (allowed >= 1.0)
+    return _exact_check(one, (low, allowed, is_open), wrong, flips, fault, outcome)
+
+
+def _exact_check(
+    one: LoadedForm,
+    errors: tuple[FloatArray, FloatArray, BoolArray],
+    wrong: BoolArray,
+    flips: BoolArray,
+    fault: str | None,
+    outcome: Outcome,
+) -> ExactCheck:
+    """Return a check, by the error of each row, its bound and whether that is open."""
+    low, allowed, is_open = errors
+    bounded = np.where(is_open, 0.0, low)
     worst = int(np.argmax(bounded)) if low.size else 0
+    count = f"{int(wrong.sum())} of {wrong.size} rows are beyond the bound"
     return ExactCheck(
-        values.shape[1],
+        int(wrong.size),
         float(bounded[worst]) if low.size else 0.0,
         float(allowed[worst]) if low.size else 0.0,
         float(low.max(initial=0.0)),
         int(flips.sum()),
-        int((known & (allowed >= 1.0)).sum()),
-        tuple(faults),
+        int(is_open.sum()),
+        () if fault is None else (f"{one.title}: {count}: {fault}",),
         outcome,
     )
+
+
+def _number_check(
+    one: LoadedForm, values: FloatArray, outcome: Outcome, right: Outcome
+) -> ExactCheck:
+    """Compare all numbers of a system with the right ones."""
+    gap, allowed = number_gaps(one.model, values, outcome, right)
+    wrong = np.asarray((gap > allowed).any(axis=0))
+    fault = None
+    if wrong.any():
+        excess = np.where(gap > allowed, gap, -1.0)
+        line, row = np.unravel_index(int(np.argmax(excess)), gap.shape)
+        names = [f"output {output.name!r}" for output in one.model.outputs]
+        names += [f"rule {k + 1}" for k in range(len(gap) - len(names) - 1)]
+        has_strengths = len(gap) > len(one.model.outputs) + 1
+        number, other = (
+            float(_numbers(some, has_strengths=has_strengths)[line, row])
+            for some in (outcome, right)
+        )
+        fault = f"{[*names, 'status'][line]} {number!r} where {other!r} is right, "
+        fault += f"{allowed[line, row]:.3g} allowed: "
+        fault += row_text(one.model.inputs, values, int(row))
+    spans = np.ones((len(gap), 1))
+    spans[: len(one.model.outputs)] = output_spans(one.model, right)
+    is_open = allowed > _EDGE * spans
+    low = np.where(is_open & (gap <= allowed), 0.0, gap)
+    worst = np.argmax(low, axis=0), np.arange(gap.shape[1])
+    errors = low[worst], allowed[worst], np.asarray(is_open.any(axis=0))
+    flips = outcome.status != right.status
+    return _exact_check(one, errors, wrong, flips, fault, outcome)
+
+
+def number_gaps(
+    model: Document, values: FloatArray, one: Outcome, two: Outcome
+) -> tuple[FloatArray, FloatArray]:
+    """Return how far the numbers of a system are apart, and how far they may be.
+
+    Returns:
+        Two arrays of shape (numbers, rows): outputs, activations if both have them,
+        and the status. A number is infinitely far from NaN.
+    """
+    has_strengths = one.strengths is not None and two.strengths is not None
+    first, second = (_numbers(some, has_strengths=has_strengths) for some in (one, two))
+    is_same = same_bits(first, second)
+    with np.errstate(invalid="ignore"):
+        gap = np.abs(first - second)
+    gap[np.isnan(gap)] = np.inf
+    gap[is_same] = 0.0
+    rows = np.flatnonzero(~is_same.all(axis=0))
+    allowed = np.zeros(gap.shape)
+    if rows.size:
+        program = program_of(model, with_strengths=has_strengths)
+        allowed[:, rows] = error_bounds(program, values[:, rows])
+    return gap, allowed
+
+
+def _numbers(outcome: Outcome, *, has_strengths: bool) -> FloatArray:
+    """Return all numbers of a system in the order of its program's results."""
+    strengths = outcome.strengths if has_strengths else None
+    parts = (outcome.outputs, strengths, outcome.status[np.newaxis])
+    table: FloatArray = np.vstack([part for part in parts if part is not None])
+    return table
+
+
+def output_spans(model: Document, outcome: Outcome) -> FloatArray:
+    """Return the width of each output's range, or its largest size, as a column."""
+    numbers = np.abs(np.empty((0, 1)) if outcome.outputs is None else outcome.outputs)
+    numbers[~np.isfinite(numbers)] = 0.0
+    spans = np.maximum(numbers.max(axis=1, initial=0.0, keepdims=True), 1.0)
+    for line, output in enumerate(model.outputs):
+        if output.low is not None and output.high is not None:
+            spans[line] = output.high - output.low
+    return spans
 
 
 def allowed_errors(one: LoadedForm, values: FloatArray) -> FloatArray:
@@ -216,7 +358,7 @@ def allowed_errors(one: LoadedForm, values: FloatArray) -> FloatArray:
     return allowed
 
 
-def missing_rows(model: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
+def missing_rows(model: Document, values: FloatArray, dtype: Dtype) -> BoolArray:
     """Return which rows count as missing, by the declared policy.
 
     A row is missing if the value of any variable is not finite in the type of axes:
@@ -228,19 +370,7 @@ def missing_rows(model: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
         >>> missing_rows(tree, np.array([[1.0, np.nan, 1e39]]), "float32").tolist()
         [False, True, True]
     """
-    kind = np.dtype(np.float32 if dtype == "float32" else np.float64)
+    kind = np.dtype(np.float32) if dtype == "float32" else np.dtype(np.float64)
     with np.errstate(all="ignore"):
-        rounded = values.astype(kind).astype(np.float64)  # what overflows is missing
-        rounded = filled_values(model.variables, rounded)
-        axes = dict(zip(model.inputs, rounded.astype(kind), strict=True))
-        known = np.ones(values.shape[1], np.bool_)
-        for variable in model.variables:
-            total = axes.get(variable.name)
-            for part in variable.parts:
-                weight, centre = (kind.type(n) for n in (part.weight, part.centre))
-                step = weight * (axes[part.input] - centre)
-                total = step if total is None else total + step
-            if total is not None:
-                known &= np.isfinite(total)
-    missing: BoolArray = ~known
-    return missing
+        lines = axis_lines(plan_axes(model.variables, kind), values)
+    return np.asarray(~np.isfinite(lines).all(axis=0))

@@ -3,35 +3,48 @@
 An input is stiff if degrees change over a distance that is small beside its values:
 float32 keeps 24 bits, so a value x is wrong by up to |x| 2**-24, and a degree by that
 times its steepest slope. Whether it happens is tried: one input at a time is rounded to
-float32, and the exact answers to the rows before and after are compared.
+float32, moved by one unit in the last place, and by a billionth of its range, and the
+native answers to the rows before and after are compared.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 import numpy as np
 
-from fuzzytree.checking.stability.results import Criterion, CurveFault, Stiff, Trial
+from fuzzytree.checking.comparing import ModelRun, labels, strength_gap
+from fuzzytree.checking.stability.results import (
+    Criterion,
+    CurveFault,
+    Move,
+    Stiff,
+    Trial,
+)
+from fuzzytree.checking.stability.runs import forms_of, output_spans, row_text
 from fuzzytree.model import (
     LR,
     Band,
+    Curve,
+    Document,
     FloatArray,
-    FuzzyTree,
-    Model,
+    Formula,
+    Linear,
+    Outcome,
     Points,
-    RuleBase,
     Shape,
     Term,
     Variable,
 )
-from fuzzytree.numerics import UNIT, Conduct, Decisions, conduct, decide, degree_bound
-from fuzzytree.semantics import forms, landmarks
+from fuzzytree.numerics import UNIT, Conduct, conduct, degree_bound
+from fuzzytree.runtimes import baseline
+from fuzzytree.semantics import jet, landmarks_of
 
 SAFE = 1e-4
-"""The error of a degree up to which a number type is called safe."""
+"""The error of a degree, or of an output as a share of its range, that is safe."""
 
 _DOUBLE = 2.0**-29  # a rounding of double, in roundings of float32
 _OFFSET_HELPS = 16.0  # times the range of the values, at least, are they from zero
@@ -62,31 +75,39 @@ class InputScale(NamedTuple):
         return max(abs(self.low), abs(self.high))
 
 
-def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff, ...]:
+def stiffness(
+    model: Document, values: FloatArray, *, is_data: bool
+) -> tuple[Stiff, ...]:
     """Return what float32 costs each input of a model, the costliest first.
 
-    No class of data should change; probes lie on edges, where some must.
+    No answer to data should change; probes lie on edges, where some must.
     """
-    rule_bases = [form for form in forms(model).values() if isinstance(form, RuleBase)]
-    step = max(-(-values.shape[1] // _ROWS), 1)
-    rows = values[:, ::step]
-    scales = input_scales(model, rows)
-    near = _near(model, rows, scales)
-    exact = [decide(form, near) for form in rule_bases]
+    scales = input_scales(model, values)
+    near = _near(model, values[:, :: max(-(-values.shape[1] // _ROWS), 1)], scales)
+    every = [form for form in forms_of(model).values() if form.rules]
+    runs = [baseline().load(form) for form in every]
+    answers = [run(near) for run in runs]
+
+    def move(line: int, step: str, value: FloatArray) -> Move:
+        """Return the most that a form moves when one input has another value."""
+        changed = near.copy()
+        changed[line] = value
+        moves = [
+            _move(form, step, near, before, run(changed))
+            for form, run, before in zip(every, runs, answers, strict=True)
+        ]
+        return max(moves, key=lambda one: (one.changed, one.largest))
+
     records: list[Stiff] = []
     for line, name in enumerate(model.inputs):
-        scale = scales[name]
-        changed = near.copy()
+        scale, here = scales[name], near[line]
+        reach = 1e-9 * ((scale.high - scale.low) or scale.location)
         with np.errstate(over="ignore"):  # beyond float32 is missing
-            changed[line] = near[line].astype(np.float32)
-        gap, flips = 0.0, 0
-        for form, before in zip(rule_bases, exact, strict=True):
-            after = decide(form, changed)
-            flips = max(flips, int((after.label != before.label).sum()))
-            gap = max(gap, _gap(before, after))
+            single = move(line, "float32", here.astype(np.float32).astype(np.float64))
         predicted = scale.slope * scale.location * UNIT
         offset = _offset(scale)
-        is_safe = max(predicted, scale.curves) <= SAFE and not (is_data and flips)
+        is_safe = max(predicted, scale.curves) <= SAFE
+        is_safe = is_safe and not (is_data and single.changed)
         spread = scale.spread if math.isfinite(scale.spread) else None
         is_known = spread is not None and scale.location > 0.0
         records.append(
@@ -96,17 +117,51 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
                 scale.location,
                 scale.spread / scale.location if is_known else None,
                 min(predicted, 1.0),
-                gap,
-                flips,
+                single.largest,
+                single.changed,
                 near.shape[1],
                 None if is_safe else offset,
                 _advice(scale, predicted, offset, is_safe=is_safe),
+                (
+                    move(line, "1 ulp", np.nextafter(here, np.inf)),
+                    move(line, "1e-9 of its range", here + reach),
+                ),
             )
         )
     return tuple(sorted(records, key=lambda one: (-one.predicted, -one.observed)))
 
 
-def input_scales(model: Model, values: FloatArray) -> dict[str, InputScale]:
+def _move(
+    model: Document, step: str, rows: FloatArray, before: Outcome, after: Outcome
+) -> Move:
+    """Return how far the answers of a model move, and the row of the largest jump."""
+    if before.outputs is not None and after.outputs is not None:
+        spans = output_spans(model, before)
+        with np.errstate(invalid="ignore"):
+            moves = np.abs(after.outputs - before.outputs) / spans
+        is_number = np.isfinite(before.outputs), np.isfinite(after.outputs)
+        moves[~is_number[0] & ~is_number[1]] = 0.0
+        changed = ~(moves <= SAFE).all(axis=0)
+    else:
+        first, second = (
+            labels(ModelRun("", model, one))  # type: ignore[arg-type] # has classes
+            for one in (before, after)
+        )
+        moves, changed = strength_gap(after, before)[np.newaxis], first != second
+    moves = np.nan_to_num(moves, nan=1.0, posinf=1.0)  # a number comes or goes
+    largest = moves.max(axis=0, initial=0.0)
+    row = int(np.argmax(np.where(changed, largest, -1.0))) if changed.any() else None
+    line = int(np.argmax(moves[:, row])) if row is not None else 0
+    return Move(
+        step,
+        float(largest.max(initial=0.0)),
+        int(changed.sum()),
+        model.outputs[line].name if model.outputs and row is not None else "",
+        "" if row is None else row_text(model.inputs, rows, row),
+    )
+
+
+def input_scales(model: Document, values: FloatArray) -> dict[str, InputScale]:
     """Return the scale of each input, over all forms of a model.
 
     A combination passes its terms' widths on to its inputs, divided by their weights.
@@ -116,19 +171,20 @@ def input_scales(model: Model, values: FloatArray) -> dict[str, InputScale]:
     slopes: dict[str, list[float]] = {name: [] for name in model.inputs}
     places: dict[str, list[float]] = {name: [] for name in model.inputs}
     curves = dict.fromkeys(model.inputs, 0.0)
-    for form in forms(model).values():
+    for form in forms_of(model).values():
         for variable in form.variables:
-            shapes = [term.shape for term in variable.terms]
-            steep = max((_slope(shape) for shape in shapes), default=0.0)
-            width = min(map(_width, shapes), default=math.inf)
-            bounds = (degree_bound(shape, "mixed") for shape in shapes)
+            curves_of = [term.function for term in variable.terms]
+            steep = max(map(_slope, curves_of), default=0.0)
+            width = min(map(_width, curves_of), default=math.inf)
+            bounds = [degree_bound(c, "mixed") for c in curves_of if _is_shape(c)]
             fixed = max((bound.fixed for bound in bounds), default=0.0)
             for name, weight in _inputs_of(variable):
                 curves[name] = max(curves[name], fixed)
                 widths[name].append(width / abs(weight))
                 slopes[name].append(steep * abs(weight))
             if not variable.parts:
-                places[variable.name] += _places(variable, shapes)
+                marks = [mark for curve in curves_of for mark in landmarks_of(curve)]
+                places[variable.name] += marks
             for part in variable.parts:
                 places[part.input].append(part.centre)
     lines = dict(zip(model.inputs, values, strict=True))
@@ -150,12 +206,8 @@ def _inputs_of(variable: Variable) -> Iterator[tuple[str, float]]:
         yield part.input, part.weight
 
 
-def _places(variable: Variable, shapes: Sequence[Shape]) -> list[float]:
-    return [mark for shape in shapes for mark in landmarks(shape)]
-
-
 def _range(
-    model: Model, name: str, places: Sequence[float], line: FloatArray
+    model: Document, name: str, places: Sequence[float], line: FloatArray
 ) -> tuple[float, float]:
     """Return the declared range of an input, or one around what is known of it."""
     declared = next(v for v in model.variables if v.name == name)
@@ -169,25 +221,35 @@ def _range(
     return float(finite.min()), float(finite.max())
 
 
-def _slope(shape: Shape) -> float:
+def _is_shape(curve: Curve) -> TypeGuard[Shape]:
+    return isinstance(curve, Band | LR | Points)
+
+
+def _slope(curve: Curve) -> float:
     """Return a bound of the slope of a degree; steps show in flips alone."""
-    return degree_bound(shape, "float32").per_unit
+    if _is_shape(curve):
+        return degree_bound(curve, "float32").per_unit
+    if isinstance(curve, Formula | Linear):
+        return 0.0  # it has no degree of its own
+    knots = sorted({*curve.knots(), *(curve.extent or ())})
+    slopes = (jet(curve, a, b).slope.size for a, b in itertools.pairwise(knots))
+    return max(filter(math.isfinite, slopes), default=0.0)
 
 
-def _width(shape: Shape) -> float:
+def _width(curve: Curve) -> float:
     """Return the shortest distance over which a degree goes all the way."""
-    match shape:
+    match curve:
         case Band():
-            return min((abs(a - b) for a, b in shape.flanks), default=math.inf)
+            return min((abs(a - b) for a, b in curve.flanks), default=math.inf)
         case LR(left=below, right=above):
             return min(below.spread, above.spread)
-        case Points():
-            slope = _slope(shape)
+        case _:
+            slope = _slope(curve)
             return 1.0 / slope if slope else math.inf
 
 
 def _near(
-    model: Model, values: FloatArray, scales: dict[str, InputScale]
+    model: Document, values: FloatArray, scales: dict[str, InputScale]
 ) -> FloatArray:
     """Return the rows that lie within twice the range of every input."""
     inside = np.isfinite(values).all(axis=0)
@@ -198,15 +260,6 @@ def _near(
             inside &= values[line] >= scale.low - reach
             inside &= values[line] <= scale.high + reach
     return values[:, inside]
-
-
-def _gap(before: Decisions, after: Decisions) -> float:
-    """Return by how much an exact strength changed at most, as far as it is known."""
-    if before.strengths is None or after.strengths is None:
-        return 0.0
-    gaps = np.abs(before.strengths - after.strengths).max(axis=0, initial=0.0)
-    known = np.nan_to_num(gaps - before.doubt - after.doubt, nan=0.0)
-    return max(float(known.max(initial=0.0)), 0.0)
 
 
 def _offset(scale: InputScale) -> float | None:
@@ -254,7 +307,7 @@ _ADVICE = (
 _NEGLIGIBLE = 1e-9  # overshoot and rises below are not reported
 
 
-def curves(model: Model) -> tuple[Criterion, tuple[CurveFault, ...]]:
+def curves(model: Document) -> tuple[Criterion, tuple[CurveFault, ...]]:
     """Judge the curve of every term of a model, by proof and not by samples (N7).
 
     A curve fails beyond `LARGEST_SIZE`, `LARGEST_OVERSHOOT` or `LARGEST_RISE`; below
@@ -266,7 +319,7 @@ def curves(model: Model) -> tuple[Criterion, tuple[CurveFault, ...]]:
     trial = Trial("N7", _ADVICE, worst=0.0)
     curve_faults: list[CurveFault] = []
     for form, variable, term in _terms(model):
-        for side in conduct(term.shape):
+        for side in conduct(term.function) if _is_shape(term.function) else ():
             trial.cases += 1
             fault = _fault(form, variable, term, side)
             if fault is not None:
@@ -284,19 +337,15 @@ def curves(model: Model) -> tuple[Criterion, tuple[CurveFault, ...]]:
     return trial.result(*[fact] * (harmless > 0)), tuple(curve_faults)
 
 
-def _terms(model: Model) -> Iterator[tuple[str, str, Term]]:
+def _terms(model: Document) -> Iterator[tuple[str, str, Term]]:
     """Yield each term of a model once, with its form and its variable."""
-    is_raw = isinstance(model, RuleBase) and model.kind == "raw"
-    form = "raw" if is_raw else "rules" if isinstance(model, RuleBase) else "relative"
-    known: set[tuple[str, Shape]] = set()
-    groups = [(form, v.name, v.terms) for v in model.variables]
-    if isinstance(model, FuzzyTree):
-        groups += [("raw", group.variable, group.terms) for group in model.sets]
-    for kind, variable, terms in groups:
-        for term in terms:
-            if (variable, term.shape) not in known:
-                known.add((variable, term.shape))
-                yield kind, variable, term
+    known: set[tuple[str, Curve]] = set()
+    for title, form in forms_of(model).items():
+        for variable in form.variables if form.rules else ():
+            for term in variable.terms:
+                if (variable.name, term.function) not in known:
+                    known.add((variable.name, term.function))
+                    yield title.removesuffix(" rules"), variable.name, term
 
 
 def _fault(form: str, variable: str, term: Term, side: Conduct) -> CurveFault | None:

@@ -21,9 +21,9 @@ from fuzzytree.checking.stability.row_checks import decades, order, scaling, spe
 from fuzzytree.checking.stability.sensitivity import curves, stiffness
 from fuzzytree.checking.stability.term_checks import degenerate, edges
 from fuzzytree.model import (
+    Document,
     FloatArray,
     Format,
-    Model,
     Progress,
     Runtime,
     as_names,
@@ -40,7 +40,7 @@ _DATA = 1_000  # rows of data for the comparison with the exact answers
 
 
 def examine(
-    model: Model,
+    model: Document,
     *,
     runtimes: Sequence[Runtime],
     formats: Sequence[Format],
@@ -51,7 +51,7 @@ def examine(
     """Apply the criteria N1 to N10 to a model.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         runtimes: What to run; those that are not installed are named and left out.
         formats: What to write and take back.
         data: Rows of one's own, shape (inputs, rows); at most 1,000, evenly drawn.

@@ -5,26 +5,30 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import TypeVar, assert_never
+from typing import Any, TypeVar, cast
 
 import msgspec
 
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
-    LR,
-    Band,
+    Bell,
+    Call,
+    Curve,
+    Document,
     Dtype,
+    Expression,
+    Formula,
     FuzzyTree,
-    Model,
+    Linear,
+    Name,
+    Number,
     Part,
-    Points,
-    Shape,
-    Side,
     Term,
+    Value,
     Variable,
 )
 
-AnyModel = TypeVar("AnyModel", bound=Model)
+AnyModel = TypeVar("AnyModel", bound=Document)
 
 Change = Callable[[str, float], float]
 """What becomes of a number in the unit of a variable, by the variable's name."""
@@ -36,6 +40,13 @@ NORMAL: Mapping[Dtype, tuple[int, int]] = {
 }
 """Binary exponents of normal numbers, two doublings below the largest."""
 
+_PLACES = frozenset(
+    ("a", "b", "c", "center", "d", "end", "high", "inflection", "left", "low", "mean")
+) | {"right", "start", "value", "values"}
+_LENGTHS = frozenset(
+    ("deviation", "left_deviation", "right_deviation", "spread", "width")
+)
+
 
 class UnitChange(msgspec.Struct, frozen=True):
     """How the numbers of a model change with the units of its variables.
@@ -43,12 +54,15 @@ class UnitChange(msgspec.Struct, frozen=True):
     Attributes:
         place: A value of a variable: cuts, ends, means, ranges.
         length: A distance on it: spreads.
-        part: A summand of a combination.
+        part: A summand of a combination, by the combination's name; of a linear
+            conclusion, and a slope, by no name.
+        name: What a formula uses for a value in the unit of a variable.
     """
 
     place: Change
     length: Change
-    part: Callable[[Variable, Part], Part]
+    part: Callable[[str, Part], Part]
+    name: Callable[[str, Name], Expression] = lambda _, name: name
 
 
 def scaled(model: AnyModel, exponents: Mapping[str, int]) -> AnyModel:
@@ -60,7 +74,7 @@ def scaled(model: AnyModel, exponents: Mapping[str, int]) -> AnyModel:
     a power of two.
 
     Args:
-        model: A tree or a rule base.
+        model: Any model.
         exponents: k by the name of a variable; 0 for those not named. A combination
             keeps its unit unless it is named: its weights take up the change.
 
@@ -78,12 +92,16 @@ def scaled(model: AnyModel, exponents: Mapping[str, int]) -> AnyModel:
     def change(name: str, value: float) -> float:
         return exactly_scaled(value, exponents.get(name, 0), name)
 
-    def part(variable: Variable, one: Part) -> Part:
-        outer, inner = exponents.get(variable.name, 0), exponents.get(one.input, 0)
-        weight = exactly_scaled(one.weight, outer - inner, variable.name)
+    def part(name: str, one: Part) -> Part:
+        outer, inner = exponents.get(name, 0), exponents.get(one.input, 0)
+        weight = exactly_scaled(one.weight, outer - inner, name or one.input)
         return Part(one.input, weight, change(one.input, one.centre))
 
-    return in_units(model, UnitChange(change, change, part))
+    def in_formula(variable: str, name: Name) -> Expression:
+        k = exponents.get(variable, 0)
+        return Call("*", (Number(math.ldexp(1.0, -k)), name)) if k else name
+
+    return in_units(model, UnitChange(change, change, part, in_formula))
 
 
 def exactly_scaled(value: float, exponent: int, name: str) -> float:
@@ -118,75 +136,105 @@ def moved(model: AnyModel, offsets: Mapping[str, float]) -> AnyModel:
     def place(name: str, value: float) -> float:
         return value + offsets.get(name, 0.0)
 
-    def length(_: str, value: float) -> float:
-        return value
-
-    def part(_: Variable, one: Part) -> Part:
+    def part(_: str, one: Part) -> Part:
         return Part(one.input, one.weight, place(one.input, one.centre))
 
-    return in_units(model, UnitChange(place, length, part))
+    def in_formula(variable: str, name: Name) -> Expression:
+        offset = offsets.get(variable, 0.0)
+        return Call("-", (name, Number(offset))) if offset else name
+
+    return in_units(model, UnitChange(place, lambda _, v: v, part, in_formula))
 
 
 def in_units(model: AnyModel, units: UnitChange) -> AnyModel:
     """Return a model with every number in the unit of a variable changed."""
-    variables = tuple(_variable(variable, units) for variable in model.variables)
-    if not isinstance(model, FuzzyTree):
-        return msgspec.structs.replace(model, variables=variables)
-    nodes = tuple(
-        msgspec.structs.replace(
-            node, cuts=tuple(units.place(node.variable, cut) for cut in node.cuts)
-        )
-        for node in model.nodes
-    )
-    sets = tuple(
-        msgspec.structs.replace(group, terms=_terms(group.variable, group.terms, units))
-        for group in model.sets
-    )
-    return msgspec.structs.replace(model, variables=variables, nodes=nodes, sets=sets)
 
+    def terms(name: str, old: tuple[Term, ...]) -> tuple[Term, ...]:
+        curves = [_curve(name, term.function, model, units) for term in old]
+        pairs = zip(old, curves, strict=True)
+        return tuple(msgspec.structs.replace(t, function=curve) for t, curve in pairs)
 
-def _variable(variable: Variable, units: UnitChange) -> Variable:
-    name = variable.name
-    return msgspec.structs.replace(
-        variable,
-        terms=_terms(name, variable.terms, units),
-        low=None if variable.low is None else units.place(name, variable.low),
-        high=None if variable.high is None else units.place(name, variable.high),
-        parts=tuple(units.part(variable, part) for part in variable.parts),
-        missing=None
-        if variable.missing is None
-        else units.place(name, variable.missing),
-        is_whole=variable.is_whole
-        and all(units.place(name, value).is_integer() for value in (0.0, 1.0)),
-    )
-
-
-def _terms(name: str, terms: tuple[Term, ...], units: UnitChange) -> tuple[Term, ...]:
-    return tuple(Term(term.name, _shape(name, term.shape, units)) for term in terms)
-
-
-def _shape(name: str, shape: Shape, units: UnitChange) -> Shape:
-    def place(value: float | None) -> float | None:
+    def place(name: str, value: float | None) -> float | None:
         return None if value is None else units.place(name, value)
 
-    def side(one: Side) -> Side:
-        return msgspec.structs.replace(one, spread=units.length(name, one.spread))
+    def variable(one: Variable) -> Variable:
+        name = one.name
+        is_whole = one.is_whole and all(
+            units.place(name, value).is_integer() for value in (0.0, 1.0)
+        )
+        return msgspec.structs.replace(
+            one,
+            terms=terms(name, one.terms),
+            low=place(name, one.low),
+            high=place(name, one.high),
+            parts=tuple(units.part(name, part) for part in one.parts),
+            missing=place(name, one.missing),
+            is_whole=is_whole,
+        )
 
-    match shape:
-        case Band(low=low, high=high, left=left, right=right):
-            return Band(place(low), place(high), place(left), place(right))
-        case LR(mean=mean, left=below, right=above):
-            return LR(units.place(name, mean), side(below), side(above))
-        case Points(values=values, degrees=degrees):
-            return Points(tuple(units.place(name, v) for v in values), degrees)
-    assert_never(shape)
+    changes: dict[str, object] = {"variables": tuple(map(variable, model.variables))}
+    for field in ("outputs", "sets"):
+        groups: tuple[Any, ...] = getattr(model, field)
+        if groups:  # outputs keep their unit, and formulas use inputs
+            changes[field] = tuple(
+                msgspec.structs.replace(
+                    one,
+                    terms=terms(getattr(one, "variable", "") or one.name, one.terms),
+                )
+                for one in groups
+            )
+    if isinstance(model, FuzzyTree):
+        changes["nodes"] = tuple(
+            msgspec.structs.replace(
+                node, cuts=tuple(units.place(node.variable, cut) for cut in node.cuts)
+            )
+            for node in model.nodes
+        )
+    return msgspec.structs.replace(model, **changes)
 
 
-def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:
+def _curve(name: str, curve: Any, model: Document, units: UnitChange) -> Any:
+    """Return a function, or a part of one, by the names of its fields."""
+    if isinstance(curve, Formula):
+        return Formula(_expression(name, curve.expression, units))
+    if isinstance(curve, Linear):
+        pairs = zip(model.inputs, curve.weights, strict=True)
+        parts = [units.part("", Part(one, weight, 0.0)) for one, weight in pairs]
+        offset = curve.offset - sum(part.weight * part.centre for part in parts)
+        return Linear(tuple(part.weight for part in parts), offset)
+    changes: dict[str, object] = {}
+    for field in curve.__struct_fields__:
+        old = getattr(curve, field)
+        if isinstance(old, Value):
+            changes[field] = _curve(name, old, model, units)
+        elif field == "values":
+            changes[field] = tuple(units.place(name, value) for value in old)
+        elif field in _PLACES and old is not None:
+            changes[field] = units.place(name, old)
+        elif field in _LENGTHS:
+            changes[field] = units.length(name, old)
+        elif field == "slope" and not isinstance(curve, Bell):
+            changes[field] = units.part("", Part(name, old, 0.0)).weight
+    return msgspec.structs.replace(curve, **changes)
+
+
+def _expression(variable: str, formula: Expression, units: UnitChange) -> Expression:
+    match formula:
+        case Name(name=name):
+            return units.name(variable if name == "x" else name, formula)
+        case Call(function=function, arguments=arguments):
+            new = (_expression(variable, one, units) for one in arguments)
+            return Call(function, tuple(new))
+        case Number():
+            return formula
+
+
+def numbers_in_units(model: Document) -> Iterator[tuple[str, int, float]]:
     """Yield each number that has a unit: its variable, its power of it, its value.
 
     The power is 1 for places and lengths, and -1 for weights, which divide by it. The
-    lengths between two places are among them, for runtimes divide by those.
+    lengths between neighbouring places of a function are among them, for runtimes
+    divide by those.
     """
     numbers: list[tuple[str, int, float]] = []
 
@@ -194,7 +242,7 @@ def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:
         numbers.append((name, 1, value))
         return value
 
-    def part(_: Variable, one: Part) -> Part:
+    def part(_: str, one: Part) -> Part:
         numbers.append((one.input, -1, one.weight))
         keep(one.input, one.centre)
         return one
@@ -202,33 +250,30 @@ def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:
     in_units(model, UnitChange(keep, keep, part))
     yield from numbers
     groups = [(variable.name, variable.terms) for variable in model.variables]
-    if isinstance(model, FuzzyTree):
-        groups += [(group.variable, group.terms) for group in model.sets]
+    groups += [(group.variable, group.terms) for group in model.sets]
     for name, terms in groups:
         for term in terms:
-            yield from ((name, 1, length) for length in _lengths(term.shape))
+            places = sorted(_places(term.function))
+            yield from ((name, 1, b - a) for a, b in itertools.pairwise(places))
 
 
-def _lengths(shape: Shape) -> list[float]:
-    """Return the lengths of flanks and of the lines between points."""
-    match shape:
-        case Band():
-            return [start - end for start, end in shape.flanks]
-        case Points(values=values):
-            return [b - a for a, b in itertools.pairwise(values)]
-        case LR():
-            return []
-    assert_never(shape)
+def _places(curve: Curve) -> Iterator[float]:
+    for field in _PLACES.intersection(curve.__struct_fields__):
+        value = getattr(curve, field)
+        if field == "values":
+            yield from cast("tuple[float, ...]", value)
+        elif isinstance(value, float):
+            yield value
 
 
-def exponent_range(model: Model, dtype: Dtype) -> tuple[int, int]:
+def exponent_range(model: Document, dtype: Dtype) -> tuple[int, int]:
     """Return by which powers of two all inputs can be scaled: lowest and highest.
 
     Within the range every number with the unit of an input, multiplied, is a normal
     number of the type, so that nothing but the exponents changes.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Proposition, Rule, RuleBase
+        >>> from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase
         >>> step = Term("low", Band(high=1.0))
         >>> rule = Rule((Proposition("x", ("low",)),), "a")
         >>> rules = RuleBase("one", ("a",), (Variable("x", (step,)),), (rule,))

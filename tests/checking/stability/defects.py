@@ -233,7 +233,7 @@ def six_digits() -> Format:
     def write(model: Model, /, *, allow_loss: bool = False) -> Written:
         from fuzzytree.checking.stability.transforms import UnitChange, in_units
 
-        def part(_: Variable, one: Part) -> Part:
+        def part(_: str, one: Part) -> Part:
             return Part(one.input, short(one.weight), short(one.centre))
 
         def place(_: str, value: float) -> float:

@@ -15,7 +15,6 @@ import numpy as np
 
 from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import first_line
-from fuzzytree.checking.stability.term_checks import broken
 from fuzzytree.checking.stability.transforms import scaled
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.model.rulebase import LR
@@ -243,7 +242,7 @@ def _weak_rows(tree: FuzzyTree, values: FloatArray) -> Iterator[str]:
             shape = term.shape
             if isinstance(shape, LR) and len(levels) == 1:
                 value = next(iter(levels))
-                if broken("one", degree(shape, value)):
+                if degree(shape, value) != 1.0:
                     yield (
                         f"{group.variable} is {term.name} has degree "
                         f"{degree(shape, value)!r} at {value!r}, its only value"
