@@ -118,7 +118,7 @@ def _move_lines(inputs: Sequence[Stiff], *, is_verbose: bool) -> Iterator[str]:
         (
             one.input,
             move.step,
-            f"{move.largest:.1e}{f' of the range of {move.output}' * bool(move.output)}",
+            f"{move.largest:.1e}{move.output and f' of the range of {move.output}'}",
             f"{move.changed} of {one.rows}",
             move.row or "-",
         )

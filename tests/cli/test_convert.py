@@ -490,7 +490,7 @@ def test_a_smaller_tolerance_gives_a_smaller_bound(call: Call) -> None:
 
 
 def test_verbs_for_classes_refuse_a_system_in_one_sentence(call: Call) -> None:
-    for verb in ("bench", "stability", "needs"):
+    for verb in ("bench", "needs"):
         code, out, err = call(verb, "tipper.fll")
         assert (code, out) == (2, "")
         assert err == (

@@ -309,9 +309,11 @@ def _with_specials(model: Document, values: FloatArray) -> FloatArray:
     plain = values[:, np.isfinite(values).all(axis=0)]
     if not plain.shape[1]:
         plain = np.zeros((values.shape[0], 1))
-    bases = plain[:, :: -(-plain.shape[1] // _BASES)]
+    scales = [*input_scales(model, values).values()]
+    middle = np.array([[0.5 * one.low + 0.5 * one.high] for one in scales])
+    bases = np.hstack([plain[:, :: -(-plain.shape[1] // _BASES)], middle])
     tables = [bases, *(np.full_like(bases[:, :1], value) for value in SPECIALS)]
-    for line, scale in enumerate(input_scales(model, values).values()):
+    for line, scale in enumerate(scales):
         width = scale.spread if math.isfinite(scale.spread) else 0.0
         beyond = [scale.high + size * width for size in _BEYOND]
         beyond += [scale.low - size * width for size in _BEYOND]

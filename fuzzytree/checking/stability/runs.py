@@ -54,7 +54,7 @@ def forms_of(model: Document) -> dict[str, Document]:
     """Return what can be made of a model, by the name that people call it."""
     if isinstance(model, FuzzySystem):
         return {"system": model}
-    return {title: form for title, form in forms(model).items()}
+    return dict(forms(model).items())
 
 
 def share(values: FloatArray) -> slice:
@@ -343,7 +343,7 @@ def output_spans(model: Document, outcome: Outcome) -> FloatArray:
     for line, output in enumerate(model.outputs):
         if output.low is not None and output.high is not None:
             spans[line] = output.high - output.low
-    return spans
+    return np.asarray(spans)
 
 
 def allowed_errors(one: LoadedForm, values: FloatArray) -> FloatArray:

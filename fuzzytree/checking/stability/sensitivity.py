@@ -49,6 +49,7 @@ SAFE = 1e-4
 _DOUBLE = 2.0**-29  # a rounding of double, in roundings of float32
 _OFFSET_HELPS = 16.0  # times the range of the values, at least, are they from zero
 _ROWS = 4_000  # rows tried for each input
+_PIECES = 17  # ends of the pieces between knots whose slopes are bounded
 
 
 class InputScale(NamedTuple):
@@ -232,7 +233,9 @@ def _slope(curve: Curve) -> float:
     if isinstance(curve, Formula | Linear):
         return 0.0  # it has no degree of its own
     knots = sorted({*curve.knots(), *(curve.extent or ())})
-    slopes = (jet(curve, a, b).slope.size for a, b in itertools.pairwise(knots))
+    cuts = [np.linspace(*ends, _PIECES).tolist() for ends in itertools.pairwise(knots)]
+    pieces = itertools.chain.from_iterable(map(itertools.pairwise, cuts))
+    slopes = (jet(curve, a, b).slope.size for a, b in pieces if a < b)
     return max(filter(math.isfinite, slopes), default=0.0)
 
 

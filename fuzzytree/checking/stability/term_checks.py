@@ -129,7 +129,7 @@ def term_probes(
     values = np.array([(line * longest)[:longest] for line in lines], np.float64)
     model: Document
     if is_system:
-        blocks: Any = form.blocks  # type: ignore[union-attr] # of a system
+        blocks: Any = form.blocks
         then = blocks[0].rules[0].then[:1]
         rules = tuple(SystemRule(one, then) for one in propositions)
         block = msgspec.structs.replace(blocks[0], rules=rules, activation=Activation())

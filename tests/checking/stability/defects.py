@@ -12,6 +12,7 @@ import numpy as np
 
 from fuzzytree.exporters.table import find_format
 from fuzzytree.model.contracts import (
+    Document,
     Dtype,
     Format,
     Model,
@@ -20,6 +21,7 @@ from fuzzytree.model.contracts import (
     Runtime,
     Written,
 )
+from fuzzytree.model.curves import Gaussian, Singleton, Trapezoid
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -31,6 +33,8 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.model.rules import And, Conclusion, RuleBlock, SystemRule
+from fuzzytree.model.system import Defuzzifier, FuzzySystem, SystemOutput
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
 from fuzzytree.runtimes.rows import checked, winners
 from fuzzytree.runtimes.table import find_runtime
@@ -73,14 +77,14 @@ def one_rule(*terms: Term) -> RuleBase:
 
 
 def runtime(
-    change: Callable[[Model, Run], Run], *, dtype: Dtype = "float64"
+    change: Callable[[Document, Run], Run], *, dtype: Dtype = "float64"
 ) -> Runtime:
     """Return the native runtime with one defect."""
 
-    def load(model: Model, *, with_strengths: bool = True) -> Run:
+    def load(model: Document, *, with_strengths: bool = True) -> Run:
         return change(model, NATIVE.load(model))
 
-    return Runtime("defective", ("tree", "rules"), load, dtype=dtype)
+    return Runtime("defective", ("tree", "rules", "system"), load, dtype=dtype)
 
 
 def on_values(change: Callable[[FloatArray], FloatArray]) -> Runtime:
@@ -119,7 +123,7 @@ def _means(values: FloatArray) -> FloatArray:
     return means
 
 
-def _warning(_: Model, run: Run) -> Run:
+def _warning(_: Document, run: Run) -> Run:
     def answer(values: FloatArray) -> Outcome:
         warnings.warn("divide by zero encountered", RuntimeWarning, stacklevel=2)
         return run(values)
@@ -129,6 +133,92 @@ def _warning(_: Model, run: Run) -> Run:
 
 WARNS = runtime(_warning)
 """Lets a warning out."""
+
+
+def mamdani() -> FuzzySystem:
+    """Return a controller of nine rules and two inputs, with a default answer."""
+    names, peaks = ("low", "middle", "high"), (0.0, 5.0, 10.0)
+    sets = [
+        Term(n, Trapezoid(p - 4.0, p, p, p + 4.0))
+        for n, p in zip(names, peaks, strict=True)
+    ]
+    soft = [Term(n, Gaussian(p, 1.3)) for n, p in zip(names, peaks, strict=True)]
+    inputs = (
+        Variable("heat", tuple(sets), low=0.0, high=10.0),
+        Variable("damp", tuple(soft), low=0.0, high=10.0),
+    )
+    how = Defuzzifier("centroid", samples=100)
+    fan = SystemOutput("fan", tuple(sets), 0.0, 10.0, how, "maximum", default=7.5)
+    rules = tuple(
+        SystemRule(
+            And((Proposition("heat", (a,)), Proposition("damp", (b,)))),
+            (Conclusion("fan", names[(i + j) // 2]),),
+        )
+        for i, a in enumerate(names)
+        for j, b in enumerate(names)
+    )
+    return FuzzySystem(
+        "fan", inputs, (fan,), (RuleBlock(rules, implication="minimum"),)
+    )
+
+
+def sugeno() -> FuzzySystem:
+    """Return the controller without exponentials, and with sums of numbers."""
+    system = mamdani()
+    heat, damp = system.variables
+    damp = msgspec.structs.replace(damp, terms=heat.terms)
+    numbers = (("low", 0.1), ("middle", 0.7), ("high", 1.3))
+    fan = msgspec.structs.replace(
+        system.outputs[0],
+        terms=tuple(Term(name, Singleton(value)) for name, value in numbers),
+        defuzzifier=Defuzzifier("weighted sum"),
+        aggregation=None,
+    )
+    blocks = [msgspec.structs.replace(one, implication=None) for one in system.blocks]
+    return msgspec.structs.replace(
+        system, variables=(heat, damp), outputs=(fan,), blocks=tuple(blocks)
+    )
+
+
+def _other_order(model: Document, run: Run) -> Run:
+    """Run a system whose rules stand in the opposite order, so that its sums do."""
+    assert isinstance(model, FuzzySystem)
+    (block,) = model.blocks
+    turned = msgspec.structs.replace(block, rules=block.rules[::-1])
+    after = NATIVE.load(msgspec.structs.replace(model, blocks=(turned,)))
+
+    def answer(values: FloatArray) -> Outcome:
+        outcome = after(values)
+        assert outcome.strengths is not None
+        return msgspec.structs.replace(outcome, strengths=outcome.strengths[::-1])
+
+    return answer
+
+
+def _without_default(model: Document, run: Run) -> Run:
+    assert isinstance(model, FuzzySystem)
+    outputs = [msgspec.structs.replace(one, default=None) for one in model.outputs]
+    return NATIVE.load(msgspec.structs.replace(model, outputs=tuple(outputs)))
+
+
+def _zeros(_: Document, run: Run) -> Run:
+    def answer(values: FloatArray) -> Outcome:
+        outcome = run(values)
+        assert outcome.outputs is not None
+        numbers = np.nan_to_num(outcome.outputs, nan=0.0)
+        return msgspec.structs.replace(outcome, outputs=numbers)
+
+    return answer
+
+
+OTHER_ORDER = runtime(_other_order)
+"""Adds up what rules conclude from the last to the first."""
+
+NO_DEFAULT = runtime(_without_default)
+"""Answers no number where no rule fires."""
+
+ZEROS = runtime(_zeros)
+"""Answers 0 where there is no number."""
 
 
 def by_terms(degree: Callable[[Band | LR, float], float]) -> Runtime:
