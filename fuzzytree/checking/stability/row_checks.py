@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import msgspec
 import numpy as np
@@ -25,7 +25,6 @@ from fuzzytree.checking.stability.sensitivity import input_scales
 from fuzzytree.checking.stability.transforms import NORMAL, exponent_range, scaled
 from fuzzytree.errors import InvalidModelError, LossError
 from fuzzytree.model import (
-    BoolArray,
     Document,
     Dtype,
     FloatArray,
@@ -35,7 +34,7 @@ from fuzzytree.model import (
     Run,
     Runtime,
 )
-from fuzzytree.semantics import Status
+from fuzzytree.semantics import SPECIAL, Status
 
 BATCHES = (1, 7, 33, 1000)
 """Rows answered at a time."""
@@ -81,8 +80,7 @@ def _tables(one: LoadedForm, rows: FloatArray) -> Iterator[Attempt]:
         starts = range(0, len(every), size)
         for start in starts[:: -(-len(starts) // _CALLS)] if size < len(every) else ():
             some = every[start : start + size]
-            table = np.ascontiguousarray(rows[:, some])
-            yield f"in a batch of {len(some)}", one.run, table, some
+            yield f"in a batch of {len(some)}", one.run, rows[:, some], some
     yield "when rows are contiguous in memory", one.run, np.asfortranarray(rows), every
     yield "when numbers are apart in memory", one.run, rows[:, twice][:, ::2], every
 
@@ -102,8 +100,7 @@ def _renumbered(one: LoadedForm, rows: FloatArray) -> Iterator[Attempt]:
 
 
 _STEPS = (-300, -40, -7, 7, 40, 300)  # and the ends of the range
-_DECADES = 20.0
-_BINARY_DECADES = int(np.ceil(_DECADES * np.log2(10.0)))  # 67 doublings
+_DECADES = int(np.ceil(20.0 * np.log2(10.0)))  # 67 doublings are 20 decades
 _ADVICE_SCALING = (
     "the runtime compares with a fixed number somewhere, or leaves the number range "
     "in between; use one whose steps are differences, quotients and comparisons"
@@ -123,7 +120,8 @@ def scaling(
         The criterion, and the range of k for each form and number type.
     """
     trial = Trial("N1", _ADVICE_SCALING)
-    if not model.inputs:
+    count = len(model.inputs)
+    if not count:
         trial.skipped.append(_NO_INPUT)
         return trial.result(), ()
     usable: dict[tuple[str, Dtype], Usable] = {}
@@ -134,20 +132,21 @@ def scaling(
             trial.skipped.append(why)
             continue
         key = (one.representation, one.runtime.dtype)
-        usable[key] = Usable(one.representation, one.runtime.dtype, low, high)
+        usable[key] = Usable(*key, low, high)
         ks = [k for k in _STEPS if low < k < high]
         # An engine of others divides and multiplies in between as it likes.
         ks += [] if one.runtime.bound is not None else [low, high]
-        plans = [dict.fromkeys(model.inputs, k) for k in ks]
-        middle = min(max(0, low), high)
-        least, most = max(low, middle - 60), min(high, middle + 60)
-        plans.append(_apart(model.inputs, least, most, seed=0))
-        for plan in plans:
-            trial.add(*_tried(one, plan, values, trial.skipped))
-    facts = [
-        f"{name}: inputs times 2**{low} to 2**{high} change nothing"
-        for name, low, high in _together(tuple(usable.values()))
-    ]
+        middle, chance = min(max(0, low), high), random.Random(0)
+        ends = max(low, middle - 60), min(high, middle + 60)
+        for plan in (*([k] * count for k in ks), None):
+            plan = plan or [chance.randint(*ends) for _ in model.inputs]
+            trial.add(*_scaled(one, plan, values, trial.skipped))
+    facts: list[str] = []
+    for name, kinds in (("double", ("float64", "mixed")), ("float32", ("float32",))):
+        shared = [one for one in usable.values() if one.dtype in kinds]
+        if shared:
+            low, high = max(u.lowest for u in shared), min(u.highest for u in shared)
+            facts.append(f"{name}: inputs times 2**{low} to 2**{high} change nothing")
     return trial.result(*facts), tuple(usable.values())
 
 
@@ -159,101 +158,57 @@ def decades(
     The inputs of one combination are spread as well.
     """
     trial = Trial("N2b", _ADVICE_SCALING)
-    if len(model.inputs) < 2:
+    count = len(model.inputs)
+    if count < 2:
         trial.skipped.append("a model of one input has no features apart")
         return trial.result()
-    places = np.linspace(0, _BINARY_DECADES, len(model.inputs))
-    order = random.Random(0).sample(range(len(places)), len(places))
+    places = [int(place) for place in np.linspace(0, _DECADES, count)]
+    random.Random(0).shuffle(places)
     for one in loaded_forms(model, runtimes, trial.skipped):
         low, high = exponent_range(one.model, one.runtime.dtype)
-        start = min(max(-_BINARY_DECADES // 2, low), high - _BINARY_DECADES)
+        start = min(max(-_DECADES // 2, low), high - _DECADES)
         if start < low:
             why = f"{one.title}: its own numbers leave no room for 20 decades"
             trial.skipped.append(why)
-            continue
-        ks = [start + int(places[k]) for k in order]
-        plan = dict(zip(model.inputs, ks, strict=True))
-        trial.add(*_tried(one, plan, values, trial.skipped))
+        else:
+            plan = [start + place for place in places]
+            trial.add(*_scaled(one, plan, values, trial.skipped))
     return trial.result()
 
 
-def _together(usable: Sequence[Usable]) -> Iterator[tuple[str, int, int]]:
-    """Yield the range that all forms share, for double axes and for float32."""
-    for name, kinds in (("double", ("float64", "mixed")), ("float32", ("float32",))):
-        ranges = [one for one in usable if one.dtype in kinds]
-        if ranges:
-            lowest, highest = (
-                (one.lowest for one in ranges),
-                (u.highest for u in ranges),
-            )
-            yield name, max(lowest), min(highest)
-
-
-def _apart(inputs: Sequence[str], low: int, high: int, seed: int) -> dict[str, int]:
-    chance = random.Random(seed)
-    return {name: chance.randint(low, high) for name in inputs}
-
-
-def _tried(
-    one: LoadedForm, plan: Mapping[str, int], values: FloatArray, skipped: list[str]
+def _scaled(
+    one: LoadedForm, ks: Sequence[int], values: FloatArray, skipped: list[str]
 ) -> tuple[int, str | None]:
-    """Return how many rows were compared, and what was wrong."""
-    ks = [plan[name] for name in one.model.inputs]
-    said = (
-        f"2**{ks[0]}" if len(set(ks)) == 1 else f"2**k, k from {min(ks)} to {max(ks)}"
-    )
-    try:
-        other = scaled(one.model, plan)
-    except (LossError, InvalidModelError) as error:
-        return 1, f"{one.title}, inputs times {said}: {error}"
+    """Return how many scaled rows were compared, and what was wrong."""
+    factor = f"2**k, k from {min(ks)} to {max(ks)}"
+    factor = f"2**{ks[0]}" if len(set(ks)) == 1 else factor
     lost: list[str] = []
+    try:
+        other = scaled(one.model, dict(zip(one.model.inputs, ks, strict=True)))
+    except (LossError, InvalidModelError) as error:
+        return 1, f"{one.title}, inputs times {factor}: {error}"
     after = loaded_form(one.representation, other, one.runtime, lost)
     if after is None:
-        return 1, f"inputs times {said}: {lost[0]}"
-    some = one.some(values)
-    rows = some[:, _is_normal(some, ks, one.runtime.dtype)]
+        return 1, f"inputs times {factor}: {lost[0]}"
+    some, factors = one.some(values), np.array(ks, np.int64)[:, np.newaxis]
+    low, high = NORMAL[one.runtime.dtype]
+    is_fit = (some == 0.0) | ~np.isfinite(some)  # or normal, before and after
+    before = np.frexp(some)[1]
+    is_normal = (np.minimum(before, before + factors) >= low) & (
+        np.maximum(before, before + factors) <= high
+    )
+    rows = some[:, (is_fit | is_normal).all(axis=0)]
     if not rows.shape[1]:
-        skipped.append(f"{one.title}, inputs times {said}: no row stays in range")
+        skipped.append(f"{one.title}, inputs times {factor}: no row stays in range")
         return 0, None
-    factors = np.array(ks, np.int64)[:, np.newaxis]
-    right = one.run(rows)
-    what = f", inputs times {said}: {{}}"
-    return one.fault(what, rows, after.run(np.ldexp(rows, factors)), right)
-
-
-def _is_normal(values: FloatArray, ks: Sequence[int], dtype: Dtype) -> BoolArray:
-    """Return the rows whose numbers are normal or 0, before and after; NaN may be."""
-    low, high = NORMAL[dtype]
-    exponents = np.frexp(values)[1]
-    free = (values == 0.0) | ~np.isfinite(values)
-    fits = np.ones(values.shape[1], np.bool_)
-    for line, k in enumerate(ks):
-        here = exponents[line]
-        inside = (here >= low) & (here <= high)
-        inside &= (here + k >= low) & (here + k <= high)
-        fits &= inside | free[line]
-    return fits
+    what = f", inputs times {factor}: {{}}"
+    return one.fault(what, rows, after.run(np.ldexp(rows, factors)), one.run(rows))
 
 
 SPECIALS = (
-    math.nan,
-    math.inf,
-    -math.inf,
-    0.0,
-    -0.0,
-    5e-324,
-    -5e-324,
-    2.225073858507201e-308,
-    1e-310,
-    1e-45,
-    1e-40,
-    3.4028234663852886e38,
-    3.5e38,
-    -3.5e38,
-    1e39,
-    1e300,
-    -1e300,
-    1.7976931348623157e308,
+    *SPECIAL,
+    *(-5e-324, 2.225073858507201e-308, 1e-310, 1e-45, 1e-40),
+    *(3.4028234663852886e38, 3.5e38, -3.5e38, 1e39),
 )
 """No number, no finite one, both zeros, subnormal in double and in float32, the largest
 float32 and beyond, and the largest double."""

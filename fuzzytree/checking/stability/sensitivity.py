@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, TypeGuard
 
 import numpy as np
@@ -36,8 +36,6 @@ from fuzzytree.model import (
     Outcome,
     Points,
     Shape,
-    Term,
-    Variable,
 )
 from fuzzytree.numerics import UNIT, Conduct, conduct, degree_bound
 from fuzzytree.runtimes import baseline
@@ -53,22 +51,13 @@ _PIECES = 17  # ends of the pieces between knots whose slopes are bounded
 
 
 class InputScale(NamedTuple):
-    """The scale of an input.
+    """The scale of an input, in its unit."""
 
-    Attributes:
-        spread: The shortest distance over which a degree changes fully; infinite if
-            none does.
-        slope: The steepest slope of a degree, per unit.
-        low: The smallest value in its range.
-        high: The largest.
-        curves: What evaluating curves in float32 costs, wherever the value is found.
-    """
-
-    spread: float
-    slope: float
-    low: float
+    spread: float  # the shortest distance over which a degree changes; infinite if none
+    slope: float  # the steepest of a degree
+    low: float  # the ends of its range
     high: float
-    curves: float
+    curves: float  # what evaluating curves in float32 costs, wherever the value is
 
     @property
     def location(self) -> float:
@@ -179,10 +168,11 @@ def input_scales(model: Document, values: FloatArray) -> dict[str, InputScale]:
             width = min(map(_width, curves_of), default=math.inf)
             bounds = [degree_bound(c, "mixed") for c in curves_of if _is_shape(c)]
             fixed = max((bound.fixed for bound in bounds), default=0.0)
-            for name, weight in _inputs_of(variable):
+            parts = [(part.input, abs(part.weight)) for part in variable.parts]
+            for name, weight in parts or [(variable.name, 1.0)]:
                 curves[name] = max(curves[name], fixed)
-                widths[name].append(width / abs(weight))
-                slopes[name].append(steep * abs(weight))
+                widths[name].append(width / weight)
+                slopes[name].append(steep * weight)
             if not variable.parts:
                 marks = [mark for curve in curves_of for mark in landmarks_of(curve)]
                 places[variable.name] += marks
@@ -198,13 +188,6 @@ def input_scales(model: Document, values: FloatArray) -> dict[str, InputScale]:
         )
         for name in model.inputs
     }
-
-
-def _inputs_of(variable: Variable) -> Iterator[tuple[str, float]]:
-    if not variable.parts:
-        yield variable.name, 1.0
-    for part in variable.parts:
-        yield part.input, part.weight
 
 
 def _range(
@@ -320,75 +303,65 @@ def curves(model: Document) -> tuple[Criterion, tuple[CurveFault, ...]]:
         The criterion, and what is to be known about curves, worst first.
     """
     trial = Trial("N7", _ADVICE, worst=0.0)
-    curve_faults: list[CurveFault] = []
-    for form, variable, term in _terms(model):
-        for side in conduct(term.function) if _is_shape(term.function) else ():
-            trial.cases += 1
-            fault = _fault(form, variable, term, side)
-            if fault is not None:
-                curve_faults.append(fault)
-    curve_faults.sort(
-        key=lambda f: (not f.fails, -max(f.overshoot, f.rise), -f.condition)
-    )
-    for one in curve_faults:
-        fault_text = _sentence(one) if one.fails else None
-        trial.add(0, fault_text, worst=max(one.overshoot, one.rise))
-    harmless = len(curve_faults) - len(trial.faults)
-    fact = f"{harmless} of {trial.cases} sides bulge or rise within the limits"
-    if not trial.cases:
-        trial.skipped.append("no term of the model has a fitted curve")
-    return trial.result(*[fact] * (harmless > 0)), tuple(curve_faults)
-
-
-def _terms(model: Document) -> Iterator[tuple[str, str, Term]]:
-    """Yield each term of a model once, with its form and its variable."""
-    known: set[tuple[str, Curve]] = set()
+    results: dict[tuple[str, LR, str], tuple[CurveFault, str]] = {}
     for title, form in forms_of(model).items():
         for variable in form.variables if form.rules else ():
             for term in variable.terms:
-                if (variable.name, term.function) not in known:
-                    known.add((variable.name, term.function))
-                    yield title.removesuffix(" rules"), variable.name, term
+                curve = term.function
+                for side in conduct(curve) if isinstance(curve, LR) else ():
+                    key = variable.name, curve, side.side
+                    names = title.removesuffix(" rules"), variable.name, term.name
+                    results.setdefault(key, _fault(*names, side))
+    trial.cases = len(results)
+    told = [(fault, text) for fault, text in results.values() if fault.advice]
+    told.sort(
+        key=lambda p: (not p[0].fails, -max(p[0].overshoot, p[0].rise), -p[0].condition)
+    )
+    for fault, text in told:
+        trial.add(0, text, worst=max(fault.overshoot, fault.rise))
+    harmless = len(told) - len(trial.faults)
+    fact = f"{harmless} of {trial.cases} sides bulge or rise within the limits"
+    if not trial.cases:
+        trial.skipped.append("no term of the model has a fitted curve")
+    return trial.result(*[fact] * (harmless > 0)), tuple(fault for fault, _ in told)
 
 
-def _fault(form: str, variable: str, term: Term, side: Conduct) -> CurveFault | None:
+def _fault(
+    form: str, variable: str, term: str, side: Conduct
+) -> tuple[CurveFault, str]:
+    """Return what a side does, without advice if nothing, and how it fails if it does.
+
+    A bracket whose lower end is beyond a limit is a proof.
+    """
     overshoot = max(side.above.high, side.below.high)
     rise = side.rises[0].height if side.rises else 0.0
+    where = (side.rises[0].start, side.rises[0].end) if side.rises else None
     size = side.size.high
-    if size <= LARGEST_SIZE and max(overshoot, rise) <= _NEGLIGIBLE:
-        return None
     limits = (
-        # A rise of the lower end of a bracket above the limit is a proof.
-        (side.size.low > LARGEST_SIZE, "lower its degree, or use double"),
+        (
+            side.size.low > LARGEST_SIZE,
+            f"a step of evaluating costs up to {size:.3g} roundings",
+            "lower its degree, or use double",
+        ),
         (
             max(side.above.low, side.below.low) > LARGEST_OVERSHOOT,
+            f"the polynomial leaves [0, 1] by {overshoot:.3g}",
             "fit it with fewer points",
         ),
-        (rise > LARGEST_RISE, "fit it with fewer points, or make it monotone"),
+        (
+            rise > LARGEST_RISE,
+            "the degree rises by {:.3g} from {:g} to {:g}".format(
+                rise, *where or (0, 0)
+            ),
+            "fit it with fewer points, or make it monotone",
+        ),
     )
-    wrong = [advice for is_beyond, advice in limits if is_beyond]
-    return CurveFault(
-        variable,
-        f"{term.name} ({side.side})",
-        form,
-        size,
-        overshoot,
-        rise,
-        (side.rises[0].start, side.rises[0].end) if side.rises else None,
-        bool(wrong),
-        wrong[0] if wrong else "within the limits",
-    )
-
-
-def _sentence(fault: CurveFault) -> str:
-    parts: list[str] = []
-    if fault.condition > LARGEST_SIZE:
-        parts.append(
-            f"a step of evaluating costs up to {fault.condition:.3g} roundings"
-        )
-    if fault.overshoot > LARGEST_OVERSHOOT:
-        parts.append(f"the polynomial leaves [0, 1] by {fault.overshoot:.3g}")
-    if fault.rise > LARGEST_RISE and fault.where is not None:
-        start, end = fault.where
-        parts.append(f"the degree rises by {fault.rise:.3g} from {start:g} to {end:g}")
-    return f"{fault.form}: {fault.variable} {fault.term}: {'; '.join(parts)}"
+    wrong = [(text, advice) for is_beyond, text, advice in limits if is_beyond]
+    advice = wrong[0][1] if wrong else "within the limits"
+    if size <= LARGEST_SIZE and max(overshoot, rise) <= _NEGLIGIBLE:
+        advice = ""
+    numbers = size, overshoot, rise, where
+    name = f"{term} ({side.side})"
+    fault = CurveFault(variable, name, form, *numbers, bool(wrong), advice)
+    texts = "; ".join(text for text, _ in wrong)
+    return fault, f"{form}: {variable} {name}: {texts}" if wrong else ""

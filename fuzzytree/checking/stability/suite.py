@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
+from fuzzytree.checking.comparing import row_set
 from fuzzytree.checking.stability.exactness import exactness, offsets
-from fuzzytree.checking.stability.results import (
-    TITLES,
-    Criterion,
-    CurveFault,
-    OffsetCost,
-    Stability,
-    Trial,
-    Usable,
-)
+from fuzzytree.checking.stability.results import TITLES, Criterion, Stability, Trial
 from fuzzytree.checking.stability.roundtrips import roundtrips
 from fuzzytree.checking.stability.row_checks import decades, order, scaling, specials
 from fuzzytree.checking.stability.sensitivity import curves, stiffness
@@ -75,41 +69,34 @@ def examine(
         ['holds']
     """
     wanted = _wanted(select)
-    rows = _checked(data, len(model.inputs))
     probes = probe_values(model, _PROBES)
-    values = np.concatenate([probes, _thinned(rows, _DATA)], axis=1)
-    some = np.concatenate(
-        [probe_values(model, _SOME), _thinned(rows, _SOME_DATA)], axis=1
-    )
+    whole = row_set(model.inputs, probes, data)
+    rows = whole.values[:, whole.probes :]
+    values = np.hstack([probes, _thinned(rows, _DATA)])
+    some = np.hstack([probe_values(model, _SOME), _thinned(rows, _SOME_DATA)])
+    facts: dict[str, Any] = {}
+    checks: dict[str, Callable[[], Criterion]] = {
+        "N2b": lambda: decades(model, runtimes, some),
+        "N3": lambda: order(model, runtimes, some),
+        "N4": lambda: degenerate(model, runtimes, some),
+        "N5": lambda: edges(model, runtimes),
+        "N6": lambda: specials(model, runtimes, some),
+        "N8": lambda: exactness(model, runtimes, values),
+        "N9": lambda: roundtrips(model, formats, some),
+        "N10": lambda: Trial("N10", skipped=[_NOT_MEASURED]).result(),
+    }
     criteria: list[Criterion] = []
-    usable: tuple[Usable, ...] = ()
-    costs: tuple[OffsetCost, ...] = ()
-    faults: tuple[CurveFault, ...] = ()
     for number, code in enumerate(wanted):
         progress(f"{code} {TITLES[code]}", number / (len(wanted) + 1))
         match code:
             case "N1":
-                one, usable = scaling(model, runtimes, some)
+                one, facts["usable"] = scaling(model, runtimes, some)
             case "N2":
-                one, costs = offsets(model, runtimes, rows)
-            case "N2b":
-                one = decades(model, runtimes, some)
-            case "N3":
-                one = order(model, runtimes, some)
-            case "N4":
-                one = degenerate(model, runtimes, some)
-            case "N5":
-                one = edges(model, runtimes)
-            case "N6":
-                one = specials(model, runtimes, some)
+                one, facts["offsets"] = offsets(model, runtimes, rows)
             case "N7":
-                one, faults = curves(model)
-            case "N8":
-                one = exactness(model, runtimes, values)
-            case "N9":
-                one = roundtrips(model, formats, some)
+                one, facts["curves"] = curves(model)
             case _:
-                one = Trial(code, skipped=[_NOT_MEASURED]).result()
+                one = checks[code]()
         criteria.append(one)
     has_data = rows.shape[1] > 0
     progress("stiffness of the inputs", len(wanted) / (len(wanted) + 1))
@@ -122,32 +109,19 @@ def examine(
         tuple(runtime.name for runtime in runtimes if is_installed(runtime)),
         tuple(criteria),
         stiffness(model, rows if has_data else probes, is_data=has_data),
-        faults,
-        usable,
-        costs,
+        **facts,
     )
 
 
 def _wanted(select: Sequence[str]) -> tuple[str, ...]:
     select = as_names(select)
     codes = [code.upper().replace("B", "b") for code in select]
-    known = ", ".join(TITLES)
     for text, code in zip(select, codes, strict=True):
         if code not in TITLES:
-            raise ValueError(f"no criterion {text!r}; there is {known}")
-    if "N2" in codes:
-        codes.append("N2b")
+            raise ValueError(f"no criterion {text!r}; there is {', '.join(TITLES)}")
+    codes += ["N2b"] * ("N2" in codes)
     return tuple(code for code in TITLES if not codes or code in codes)
 
 
-def _checked(data: FloatArray | None, inputs: int) -> FloatArray:
-    if data is None:
-        return np.empty((inputs, 0))
-    if data.ndim != 2 or data.shape[0] != inputs:
-        raise ValueError(f"data must have shape ({inputs}, rows), not {data.shape}")
-    return data
-
-
 def _thinned(rows: FloatArray, limit: int) -> FloatArray:
-    step = max(-(-rows.shape[1] // limit), 1)
-    return rows[:, ::step]
+    return rows[:, :: max(-(-rows.shape[1] // limit), 1)]
