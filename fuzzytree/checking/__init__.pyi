@@ -37,9 +37,7 @@ from .dependencies import sizes_of as sizes_of
 from .programs import ProgramFile as ProgramFile
 from .representations import check as check
 from .stability.results import Criterion as Criterion
-from .stability.results import CurveFault as CurveFault
 from .stability.results import Move as Move
-from .stability.results import OffsetCost as OffsetCost
 from .stability.results import Stability as Stability
 from .stability.results import Stiff as Stiff
 from .stability.suite import examine as examine

@@ -4,29 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.checking import Criterion, CurveFault, OffsetCost, Stability, Stiff
-from fuzzytree.report.text import aligned, counted, first_lines, more_line, number
+from fuzzytree.checking import Criterion, Stability, Stiff
+from fuzzytree.report.text import aligned, counted, first_lines
 
-_CURVES_SHOWN = 5  # curves with a fault, unless all are printed
 _INPUTS_SHOWN = 6  # inputs that float32 is not safe for, unless all are printed
 _SAFE = "float32 is safe"
 
 CRITERION = ("code", "stability check", "cases", "worst", "verdict")
 _STIFF = ("input", "spread/size", "float32 costs", "observed", "changed", "advice")
 _MOVE = ("input", "moved by", "answer moves by", "changed", "most at")
-_OFFSET = (
-    "form",
-    "spread/distance",
-    "float32",
-    "mixed",
-    "double",
-    "changed in float32",
-)
-_CURVE = ("curve", "form", "size", "leaves [0, 1]", "rises", "advice")
 
 
 def stability_lines(study: Stability, *, is_verbose: bool = False) -> Iterator[str]:
-    """Yield a study: verdict, checks, and the inputs and curves with a problem.
+    """Yield a study: verdict, checks, and the inputs with a problem.
 
     Args:
         study: The study.
@@ -47,13 +37,6 @@ def stability_lines(study: Stability, *, is_verbose: bool = False) -> Iterator[s
             yield from (f"{one.code}: not tried: {text}" for text in one.skipped)
     yield from _inputs(study, is_verbose=is_verbose)
     yield from _move_lines(study.stiff, is_verbose=is_verbose)
-    if is_verbose and study.offsets:
-        yield from _offset_lines(study.offsets)
-    faults = [one for one in study.curves if is_verbose or one.fails]
-    if faults:
-        shown = faults if is_verbose else faults[:_CURVES_SHOWN]
-        yield from aligned([_CURVE, *map(_curve_row, shown)])
-        yield from more_line(len(faults) - len(shown), "curve")
     todo = [f"what to do: {text}" for text in advice(study)]
     yield from first_lines(
         todo, None if is_verbose else 5, "thing to do", "things to do"
@@ -128,29 +111,3 @@ def _move_lines(inputs: Sequence[Stiff], *, is_verbose: bool) -> Iterator[str]:
     ]
     if rows:
         yield from aligned([_MOVE, *rows])
-
-
-def _offset_lines(costs: tuple[OffsetCost, ...]) -> Iterator[str]:
-    rows = [
-        (
-            one.representation,
-            f"{one.ratio:.0e}",
-            *(
-                "cannot" if error is None else f"{error:.1e}"
-                for error in (one.float32, one.mixed, one.float64)
-            ),
-            "-" if one.float32 is None else f"{one.flips} of {one.rows}",
-        )
-        for one in costs
-    ]
-    yield from aligned([_OFFSET, *rows])
-
-
-def _curve_row(one: CurveFault) -> tuple[str, ...]:
-    where = ""
-    if one.where is not None:
-        where = f" from {number(one.where[0])} to {number(one.where[1])}"
-    rise = f"by {one.rise:.2g}{where}" if one.rise else "-"
-    leaves = f"by {one.overshoot:.2g}" if one.overshoot else "-"
-    name = f"{one.variable} {one.term}"
-    return name, one.form, f"{one.condition:.2g}", leaves, rise, one.advice

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import get_args
 
 import numpy as np
 
-from fuzzytree.checking.stability.results import Criterion, OffsetCost, Trial
+from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import (
     ExactCheck,
     FirstOutcomes,
@@ -85,7 +86,7 @@ _ADVICE_OFFSETS = (
 
 def offsets(
     model: Document, runtimes: Sequence[Runtime], data: FloatArray
-) -> tuple[Criterion, tuple[OffsetCost, ...]]:
+) -> Criterion:
     """Move every input until its narrowest term is 1e-1 to 1e-12 of its distance (N2).
 
     The moved model is a model of its own, whose numbers are rounded once. A runtime is
@@ -93,12 +94,9 @@ def offsets(
 
     There may be no rows of data. Slow runtimes get a share of the rows; those with a
     bound of their own promise nothing far from zero and are left out.
-
-    Returns:
-        The criterion, and what each distance costs in each number type.
     """
     trial = Trial("N2", _ADVICE_OFFSETS, worst=0.0)
-    costs: list[OffsetCost] = []
+    facts: list[str] = []
     scales = input_scales(model, data)
     rows = data[:, :: max(-(-data.shape[1] // _DATA), 1)]
     chosen = [runtime for runtime in runtimes if runtime.bound is None]
@@ -142,25 +140,17 @@ def offsets(
                 trial.add(check.rows, *faults, worst=check.worst)
                 checks.append((check, runtime.dtype))
             if ratio in _REPORTED and representation != "tree":
-                costs.append(_cost(representation, ratio, checks, values.shape[1]))
-    return trial.result(), tuple(costs)
+                where = f"{representation}, spread over distance {ratio:.0e}"
+                facts += (f"{where}: {cost}" for cost in _costs(checks))
+    return trial.result(*facts)
 
 
-def _cost(
-    representation: str,
-    ratio: float,
-    checks: Sequence[tuple[ExactCheck, Dtype]],
-    rows: int,
-) -> OffsetCost:
-    def largest(dtype: Dtype) -> float | None:
-        return max((one.largest for one, kind in checks if kind == dtype), default=None)
-
-    return OffsetCost(
-        representation,
-        ratio,
-        largest("float32"),
-        largest("mixed"),
-        largest("float64"),
-        max((one.flips for one, kind in checks if kind == "float32"), default=0),
-        rows,
-    )
+def _costs(checks: Sequence[tuple[ExactCheck, Dtype]]) -> Iterator[str]:
+    """Yield what a distance costs in each number type."""
+    for dtype in get_args(Dtype):
+        every = [check for check, kind in checks if kind == dtype]
+        if every:
+            error = max(one.largest for one in every)
+            flips = max(one.flips for one in every)
+            text = f"{dtype} is off by {error:.1e}"
+            yield f"{text}, and {flips} of {every[0].rows} answers change"

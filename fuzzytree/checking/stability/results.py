@@ -38,45 +38,6 @@ class Criterion(msgspec.Struct, frozen=True):
     skipped: tuple[str, ...] = ()
 
 
-class Usable(msgspec.Struct, frozen=True):
-    """Powers of two by which all inputs can be multiplied without changing an answer.
-
-    Attributes:
-        representation: Which form of the model.
-        dtype: In which number type.
-        lowest: The smallest exponent at which every number of the model is normal.
-        highest: The largest.
-    """
-
-    representation: str
-    dtype: str
-    lowest: int
-    highest: int
-
-
-class OffsetCost(msgspec.Struct, frozen=True):
-    """What a distance from zero costs, for one form of the model.
-
-    Attributes:
-        representation: Which form.
-        ratio: The spread of the narrowest term over the distance, for every input.
-        float32: The largest error of a strength in float32; None where float32
-            cannot hold the model.
-        mixed: The same in mixed numbers.
-        float64: The same in double.
-        flips: Rows whose class differs from the exact one in float32, of `rows`.
-        rows: How many rows were run.
-    """
-
-    representation: str
-    ratio: float
-    float32: float | None
-    mixed: float | None
-    float64: float | None
-    flips: int
-    rows: int
-
-
 class Move(msgspec.Struct, frozen=True):
     """How far the answers of a model move when one input does.
 
@@ -128,32 +89,6 @@ class Stiff(msgspec.Struct, frozen=True):
     moves: tuple[Move, ...] = ()
 
 
-class CurveFault(msgspec.Struct, frozen=True):
-    """A term whose curve is ill-conditioned, leaves [0, 1], or rises.
-
-    Attributes:
-        variable: Its variable.
-        term: Its name, with the side of it.
-        form: In which form of the model it stands.
-        condition: How many roundings of the largest degree evaluating it can cost.
-        overshoot: By how much the polynomial leaves [0, 1] before it is clipped.
-        rise: By how much the clipped degree rises on its way out.
-        where: Where it rises most, in the variable's unit; None if it does not.
-        fails: Whether a stated limit is exceeded.
-        advice: What to do.
-    """
-
-    variable: str
-    term: str
-    form: str
-    condition: float
-    overshoot: float
-    rise: float
-    where: tuple[float, float] | None
-    fails: bool
-    advice: str
-
-
 class Stability(msgspec.Struct, frozen=True):
     """Is a model numerically stable: the result of all criteria.
 
@@ -166,9 +101,6 @@ class Stability(msgspec.Struct, frozen=True):
         runtimes: What was run.
         criteria: In the order of their codes.
         stiff: Every input, the costliest in float32 first.
-        curves: Terms with something to know about, worst first.
-        usable: By what the inputs can be multiplied.
-        offsets: What a distance from zero costs.
     """
 
     FORMAT: ClassVar[str] = "fuzzytree-stability/1"
@@ -181,9 +113,6 @@ class Stability(msgspec.Struct, frozen=True):
     runtimes: tuple[str, ...]
     criteria: tuple[Criterion, ...]
     stiff: tuple[Stiff, ...] = ()
-    curves: tuple[CurveFault, ...] = ()
-    usable: tuple[Usable, ...] = ()
-    offsets: tuple[OffsetCost, ...] = ()
 
     @property
     def ok(self) -> bool:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.stability.results import Criterion, Trial, Usable
+from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import (
     FirstOutcomes,
     LoadedForm,
@@ -26,7 +26,6 @@ from fuzzytree.checking.stability.transforms import NORMAL, exponent_range, scal
 from fuzzytree.errors import InvalidModelError, LossError
 from fuzzytree.model import (
     Document,
-    Dtype,
     FloatArray,
     IntArray,
     Linear,
@@ -110,29 +109,26 @@ _NO_INPUT = "the model has no input"
 
 def scaling(
     model: Document, runtimes: Sequence[Runtime], values: FloatArray
-) -> tuple[Criterion, tuple[Usable, ...]]:
+) -> Criterion:
     """Multiply the inputs of a model and of rows by 2**k; demand equal bits (N1).
 
     k runs over a ladder up to both ends of the range in which every number of the
     model stays normal; last, every input has a k of its own.
-
-    Returns:
-        The criterion, and the range of k for each form and number type.
     """
     trial = Trial("N1", _ADVICE_SCALING)
     count = len(model.inputs)
     if not count:
         trial.skipped.append(_NO_INPUT)
-        return trial.result(), ()
-    usable: dict[tuple[str, Dtype], Usable] = {}
+        return trial.result()
+    ranges: dict[str, list[tuple[int, int]]] = {}
     for one in loaded_forms(model, runtimes, trial.skipped):
         low, high = exponent_range(one.model, one.runtime.dtype)
         if low > high:
             why = f"{one.title}: its numbers span more than the type does"
             trial.skipped.append(why)
             continue
-        key = (one.representation, one.runtime.dtype)
-        usable[key] = Usable(*key, low, high)
+        axes = "float32" if one.runtime.dtype == "float32" else "double"
+        ranges.setdefault(axes, []).append((low, high))
         ks = [k for k in _STEPS if low < k < high]
         # An engine of others divides and multiplies in between as it likes.
         ks += [] if one.runtime.bound is not None else [low, high]
@@ -142,12 +138,10 @@ def scaling(
             plan = plan or [chance.randint(*ends) for _ in model.inputs]
             trial.add(*_scaled(one, plan, values, trial.skipped))
     facts: list[str] = []
-    for name, kinds in (("double", ("float64", "mixed")), ("float32", ("float32",))):
-        shared = [one for one in usable.values() if one.dtype in kinds]
-        if shared:
-            low, high = max(u.lowest for u in shared), min(u.highest for u in shared)
-            facts.append(f"{name}: inputs times 2**{low} to 2**{high} change nothing")
-    return trial.result(*facts), tuple(usable.values())
+    for name, every in ranges.items():
+        low, high = max(low for low, _ in every), min(high for _, high in every)
+        facts.append(f"{name}: inputs times 2**{low} to 2**{high} change nothing")
+    return trial.result(*facts)
 
 
 def decades(

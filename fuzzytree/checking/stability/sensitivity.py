@@ -19,7 +19,6 @@ import numpy as np
 from fuzzytree.checking.comparing import ModelRun, labels, strength_gap
 from fuzzytree.checking.stability.results import (
     Criterion,
-    CurveFault,
     Move,
     Stiff,
     Trial,
@@ -293,75 +292,54 @@ _ADVICE = (
 _NEGLIGIBLE = 1e-9  # overshoot and rises below are not reported
 
 
-def curves(model: Document) -> tuple[Criterion, tuple[CurveFault, ...]]:
+def curves(model: Document) -> Criterion:
     """Judge the curve of every term of a model, by proof and not by samples (N7).
 
     A curve fails beyond `LARGEST_SIZE`, `LARGEST_OVERSHOOT` or `LARGEST_RISE`; below
-    them, it is counted.
-
-    Returns:
-        The criterion, and what is to be known about curves, worst first.
+    them, what it does is a fact.
     """
     trial = Trial("N7", _ADVICE, worst=0.0)
-    results: dict[tuple[str, LR, str], tuple[CurveFault, str]] = {}
+    sides: dict[tuple[str, LR, str], str] = {}
     for title, form in forms_of(model).items():
         for variable in form.variables if form.rules else ():
             for term in variable.terms:
-                curve = term.function
-                for side in conduct(curve) if isinstance(curve, LR) else ():
-                    key = variable.name, curve, side.side
-                    names = title.removesuffix(" rules"), variable.name, term.name
-                    results.setdefault(key, _fault(*names, side))
-    trial.cases = len(results)
-    told = [(fault, text) for fault, text in results.values() if fault.advice]
-    told.sort(
-        key=lambda p: (not p[0].fails, -max(p[0].overshoot, p[0].rise), -p[0].condition)
-    )
-    for fault, text in told:
-        trial.add(0, text, worst=max(fault.overshoot, fault.rise))
-    harmless = len(told) - len(trial.faults)
-    fact = f"{harmless} of {trial.cases} sides bulge or rise within the limits"
-    if not trial.cases:
+                if isinstance(curve := term.function, LR):
+                    name = (
+                        f"{title.removesuffix(' rules')}: {variable.name} {term.name}"
+                    )
+                    for side in ("left", "right"):
+                        sides.setdefault((variable.name, curve, side), name)
+    results: list[tuple[float, bool, str]] = []
+    for (_, curve, name), lead in sides.items():
+        sides_of = {one.side: one for one in conduct(curve)}
+        worst, is_wrong, text = _conduct(sides_of[name])
+        if text:
+            results.append((worst, is_wrong, f"{lead} ({name}): {text}"))
+    results.sort(reverse=True)
+    trial.add(len(sides), *(text for _, is_wrong, text in results if is_wrong))
+    trial.worst = max((worst for worst, _, _ in results), default=0.0)
+    if not sides:
         trial.skipped.append("no term of the model has a fitted curve")
-    return trial.result(*[fact] * (harmless > 0)), tuple(fault for fault, _ in told)
+    facts = [text for _, is_wrong, text in results if not is_wrong]
+    return trial.result(*(f"{text}, within the limits" for text in facts))
 
 
-def _fault(
-    form: str, variable: str, term: str, side: Conduct
-) -> tuple[CurveFault, str]:
-    """Return what a side does, without advice if nothing, and how it fails if it does.
+def _conduct(side: Conduct) -> tuple[float, bool, str]:
+    """Return how far a side leaves [0, 1] or rises, whether it fails, and a sentence.
 
     A bracket whose lower end is beyond a limit is a proof.
     """
     overshoot = max(side.above.high, side.below.high)
     rise = side.rises[0].height if side.rises else 0.0
-    where = (side.rises[0].start, side.rises[0].end) if side.rises else None
-    size = side.size.high
-    limits = (
-        (
-            side.size.low > LARGEST_SIZE,
-            f"a step of evaluating costs up to {size:.3g} roundings",
-            "lower its degree, or use double",
-        ),
-        (
-            max(side.above.low, side.below.low) > LARGEST_OVERSHOOT,
-            f"the polynomial leaves [0, 1] by {overshoot:.3g}",
-            "fit it with fewer points",
-        ),
-        (
-            rise > LARGEST_RISE,
-            "the degree rises by {:.3g} from {:g} to {:g}".format(
-                rise, *where or (0, 0)
-            ),
-            "fit it with fewer points, or make it monotone",
-        ),
-    )
-    wrong = [(text, advice) for is_beyond, text, advice in limits if is_beyond]
-    advice = wrong[0][1] if wrong else "within the limits"
-    if size <= LARGEST_SIZE and max(overshoot, rise) <= _NEGLIGIBLE:
-        advice = ""
-    numbers = size, overshoot, rise, where
-    name = f"{term} ({side.side})"
-    fault = CurveFault(variable, name, form, *numbers, bool(wrong), advice)
-    texts = "; ".join(text for text, _ in wrong)
-    return fault, f"{form}: {variable} {name}: {texts}" if wrong else ""
+    is_wrong = side.size.low > LARGEST_SIZE or rise > LARGEST_RISE
+    is_wrong = is_wrong or max(side.above.low, side.below.low) > LARGEST_OVERSHOOT
+    parts: list[str] = []
+    if side.size.high > LARGEST_SIZE:
+        size = f"{side.size.high:.3g}"
+        parts.append(f"a step of evaluating costs up to {size} roundings")
+    if overshoot > _NEGLIGIBLE:
+        parts.append(f"the polynomial leaves [0, 1] by {overshoot:.3g}")
+    if rise > _NEGLIGIBLE:
+        where = f"from {side.rises[0].start:g} to {side.rises[0].end:g}"
+        parts.append(f"the degree rises by {rise:.3g} {where}")
+    return max(overshoot, rise), is_wrong, "; ".join(parts)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -74,13 +73,15 @@ def examine(
     rows = whole.values[:, whole.probes :]
     values = np.hstack([probes, _thinned(rows, _DATA)])
     some = np.hstack([probe_values(model, _SOME), _thinned(rows, _SOME_DATA)])
-    facts: dict[str, Any] = {}
     checks: dict[str, Callable[[], Criterion]] = {
+        "N1": lambda: scaling(model, runtimes, some),
+        "N2": lambda: offsets(model, runtimes, rows),
         "N2b": lambda: decades(model, runtimes, some),
         "N3": lambda: order(model, runtimes, some),
         "N4": lambda: degenerate(model, runtimes, some),
         "N5": lambda: edges(model, runtimes),
         "N6": lambda: specials(model, runtimes, some),
+        "N7": lambda: curves(model),
         "N8": lambda: exactness(model, runtimes, values),
         "N9": lambda: roundtrips(model, formats, some),
         "N10": lambda: Trial("N10", skipped=[_NOT_MEASURED]).result(),
@@ -88,16 +89,7 @@ def examine(
     criteria: list[Criterion] = []
     for number, code in enumerate(wanted):
         progress(f"{code} {TITLES[code]}", number / (len(wanted) + 1))
-        match code:
-            case "N1":
-                one, facts["usable"] = scaling(model, runtimes, some)
-            case "N2":
-                one, facts["offsets"] = offsets(model, runtimes, rows)
-            case "N7":
-                one, facts["curves"] = curves(model)
-            case _:
-                one = checks[code]()
-        criteria.append(one)
+        criteria.append(checks[code]())
     has_data = rows.shape[1] > 0
     progress("stiffness of the inputs", len(wanted) / (len(wanted) + 1))
     return Stability(
@@ -109,7 +101,6 @@ def examine(
         tuple(runtime.name for runtime in runtimes if is_installed(runtime)),
         tuple(criteria),
         stiffness(model, rows if has_data else probes, is_data=has_data),
-        **facts,
     )
 
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from fractions import Fraction
-from typing import Any, assert_never, cast
+from typing import Any, assert_never
 
 import msgspec
 import numpy as np
@@ -18,25 +17,22 @@ import numpy as np
 from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import (
     LoadedForm,
-    allowed_errors,
     exact_check,
     forms_of,
     loaded_form,
     loaded_forms,
     run_with_warning,
-    share,
     truth,
 )
-from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.checking.stability.transforms import UnitChange, in_units
+from fuzzytree.errors import FuzzyTreeError, InvalidModelError
 from fuzzytree.model import (
     LR,
     Activation,
     Band,
     Curve,
     Document,
-    Dtype,
     FloatArray,
-    Outcome,
     Points,
     Proposition,
     Rule,
@@ -48,22 +44,11 @@ from fuzzytree.model import (
     Term,
     Variable,
 )
-from fuzzytree.numerics import BELOW_ONE, exact_degree
+from fuzzytree.runtimes import definition
 from fuzzytree.semantics import landmarks_of, neighbours
 
 MOST_TERMS = 240
 """Terms that are tested one by one; of more, evenly drawn ones."""
-
-_END_SLACK: dict[Dtype, float] = {
-    "float64": 2.0**-50,
-    "mixed": 2.0**-22,
-    "float32": 2.0**-20,
-}
-"""Relative to the end of an LR set: within it the tail is 0 up to the fourth power."""
-
-Range = tuple[float, float]
-_ONE, _ZERO, _BELOW_ONE, _ANY = (1.0, 1.0), (0.0, 0.0), (0.0, BELOW_ONE), (0.0, 1.0)
-_WORDS = {_ONE: "one", _ZERO: "zero", _BELOW_ONE: "below one"}
 
 
 class TermProbes(msgspec.Struct, frozen=True):
@@ -72,14 +57,13 @@ class TermProbes(msgspec.Struct, frozen=True):
     Attributes:
         model: It has one rule for each term.
         values: Shape (inputs, rows).
-        places: For each rule: what it tests, its input's line, the function, and the
-            rows that hold its own edges.
+        places: For each rule the variable and the term that it tests, and the function.
         left_out: How many terms are not tested, for there are too many.
     """
 
     model: Document
     values: FloatArray
-    places: tuple[tuple[str, int, Curve, slice], ...]
+    places: tuple[tuple[str, str, Curve], ...]
     left_out: int
 
 
@@ -100,7 +84,7 @@ def term_probes(
     numbers = itertools.count()
     variables: list[Variable] = []
     lines: list[list[float]] = []
-    places: list[tuple[str, int, Curve, slice]] = []
+    places: list[tuple[str, str, Curve]] = []
     propositions: list[Proposition] = []
     for source in sources:
         line: list[float] = []
@@ -111,18 +95,14 @@ def term_probes(
             if change is not None and isinstance(term.function, Band | LR | Points):
                 term = msgspec.structs.replace(term, function=change(term.function))
             terms.append(term)
-            edges = [
-                near for x in landmarks_of(term.function) for near in neighbours(x)
-            ]
-            rows = slice(len(line), len(line) + len(dict.fromkeys(edges)))
-            line += dict.fromkeys(edges)
-            name = f"{source.name} is {term.name}"
-            places.append((name, len(lines), term.function, rows))
+            marks = landmarks_of(term.function)
+            line += (near for x in marks for near in neighbours(x))
+            places.append((source.name, term.name, term.function))
             propositions.append(Proposition(source.name, (term.name,)))
         if terms or is_system:
             kept = source if is_system else Variable(source.name)
             variables.append(msgspec.structs.replace(kept, terms=tuple(terms)))
-            lines.append(line or [0.0])
+            lines.append([*dict.fromkeys(line)] or [0.0])
     if not propositions:
         return None
     longest = max(map(len, lines))
@@ -171,48 +151,6 @@ def collapsed(shape: Shape) -> Shape:
     assert_never(shape)
 
 
-def demanded(shape: Shape, value: float, dtype: Dtype) -> Range:
-    """Return between which numbers a degree must lie, whatever its bound is.
-
-    float32 rounds the value and every stored number once; the demand is on those.
-
-    Example:
-        >>> demanded(Band(high=1.0, right=2.0), 1.0, "float64")
-        (1.0, 1.0)
-        >>> demanded(Band(high=1.0, right=2.0), 2.0, "float64")
-        (0.0, 0.0)
-    """
-
-    def to(number: float) -> float:
-        with np.errstate(over="ignore"):
-            return float(np.float32(number)) if dtype == "float32" else number
-
-    x = to(value)
-    match shape:
-        case Band(low=low, high=high, left=left, right=right):
-            if low is not None and x <= to(low):
-                is_out = left is None or x <= to(left)
-            elif high is not None and x > to(high):
-                is_out = right is None or x >= to(right)
-            else:
-                return _ONE
-            return _ZERO if is_out else _BELOW_ONE
-        case LR(mean=mean, left=below, right=above):
-            if x == to(mean):
-                return _ONE
-            side = below if x < to(mean) else above
-            end = side.reach * side.spread
-            rounding = _END_SLACK[dtype] * (end + abs(mean))
-            return _ZERO if abs(x - to(mean)) > end + rounding else _ANY
-        case Points(values=values, degrees=degrees):
-            place = next((k for k, v in enumerate(values) if x <= to(v)), None)
-            known = degrees[-1] if place is None else None
-            if place is not None and (place == 0 or x == to(values[place])):
-                known = degrees[place]
-            return _ONE if known == 1.0 else _ZERO if known == 0.0 else _ANY
-    assert_never(shape)
-
-
 def _try_terms(
     trial: Trial,
     model: Document,
@@ -223,7 +161,7 @@ def _try_terms(
     """Compare the degrees of all terms in all runtimes with what must be.
 
     `title` names the terms of a form, with `{}` for its name; `change` gives what is
-    tested in place of each membership function, and then not against exact degrees.
+    tested in place of each membership function.
     """
     for representation, form in forms_of(model).items():
         terms = term_probes(form, change)
@@ -231,62 +169,65 @@ def _try_terms(
             continue
         if terms.left_out:
             trial.skipped.append(f"{terms.left_out} of the terms: there are too many")
-        right = truth(terms.model, terms.values) if form.outputs else None
-        exact = None if change or form.outputs else _exact_degrees(terms)
+        right = truth(terms.model, terms.values)
         name = title.format(representation)
         for runtime in runtimes:
             one = loaded_form(name, terms.model, runtime, trial.skipped)
-            if one is not None and isinstance(right, Outcome):
-                values = one.some(terms.values)
-                some = share(values) if runtime.is_slow else slice(None)
-                check = exact_check(one, values, right.part(some))
-                trial.add(check.rows, *check.faults, worst=check.worst)
-            elif one is not None:
-                _try_degrees(trial, one, terms, exact)
+            if one is None:
+                continue
+            if runtime.bound is not None:  # it promises nothing at a single value
+                trial.skipped.append(f"{runtime.name} promises a bound, and no edge")
+                continue
+            values = one.some(terms.values)
+            outcome, warning = run_with_warning(one, values)
+            trial.add(0, warning and f"{one.title}: it warns: {warning}")
+            if outcome.strengths is None:
+                trial.skipped.append(f"{runtime.name} returns no degrees")
+                continue
+            if not form.outputs:
+                trial.faults += _edge_faults(one, terms, values, outcome.strengths)
+            is_all = values.shape == terms.values.shape
+            check = exact_check(one, values, right if is_all else None)
+            trial.add(outcome.strengths.size, *check.faults, worst=check.worst)
 
 
-def _exact_degrees(terms: TermProbes) -> list[dict[float, Fraction]]:
-    return [
-        {
-            value: exact_degree(cast("Shape", curve), Fraction(value))
-            for value in terms.values[line, rows].tolist()
-        }
-        for _, line, curve, rows in terms.places
-    ]
+def _edge_faults(
+    one: LoadedForm, terms: TermProbes, values: FloatArray, degrees: FloatArray
+) -> Iterator[str]:
+    """Yield which degrees must be 1 or 0 or neither, and are not.
+
+    The definition decides, for values and stored numbers as float32 rounds them. The
+    tail of an LR set is so flat that only doubles agree about its end.
+    """
+    model, dtype = one.model, one.runtime.dtype
+    if dtype == "float32":
+        with np.errstate(over="ignore"):
+            values = values.astype(np.float32).astype(np.float64)
+        try:
+            model = in_units(model, UnitChange(_single, _single, lambda _, part: part))
+        except InvalidModelError:
+            return  # places that become one have no edges
+    right = definition().load(model)(values).strengths
+    assert right is not None  # rules have them
+    kinds = np.array([type(curve) for *_, curve in terms.places])[:, np.newaxis]
+    is_one, is_zero = right == 1.0, right == 0.0
+    if dtype != "float64":
+        is_zero &= kinds != LR
+    wrong = (is_one | is_zero) & (degrees != right)
+    wrong |= (degrees == 1.0) & (right < 1.0) & (kinds == Band)
+    wrong |= (degrees < 0.0) | (degrees > 1.0) | (np.isnan(degrees) & ~np.isnan(right))
+    lines = {name: line for line, name in enumerate(model.inputs)}
+    for rule, row in np.argwhere(wrong).tolist():
+        (name, term, _), degree = terms.places[rule], float(degrees[rule, row])
+        value = float(values[lines[name], row])
+        demand = {1.0: "one", 0.0: "zero"}.get(float(right[rule, row]), "below one")
+        where = f"{one.title}: {name} is {term} at {value!r}"
+        yield f"{where}: degree {degree!r}, not {demand}"
 
 
-def _try_degrees(
-    trial: Trial,
-    one: LoadedForm,
-    terms: TermProbes,
-    exact: list[dict[float, Fraction]] | None,
-) -> None:
-    outcome, warning = run_with_warning(one, terms.values)
-    trial.add(0, warning and f"{one.title}: it warns: {warning}")
-    if outcome.strengths is None:
-        trial.skipped.append(f"{one.runtime.name} returns no degrees")
-        return
-    if one.runtime.bound is not None:  # it promises nothing at a single value
-        trial.skipped.append(f"{one.runtime.name} promises a bound, and no edge")
-        return
-    limits = allowed_errors(one, terms.values)
-    for number, (name, line, curve, rows) in enumerate(terms.places):
-        columns = (terms.values[line], outcome.strengths[number], limits)
-        cells = zip(*(column[rows].tolist() for column in columns), strict=True)
-        for value, degree, allowed in cells:
-            trial.cases += 1
-            low, high = demanded(cast("Shape", curve), value, one.runtime.dtype)
-            fault = None
-            if not low <= degree <= high:
-                fault = f"not {_WORDS.get((low, high), 'between 0 and 1')}"
-            elif exact is not None:
-                gap = float(abs(Fraction(degree) - exact[number][value]))
-                trial.add(0, worst=gap if allowed < 1.0 else None)
-                if not gap <= allowed:
-                    fault = f"{gap:.3g} from the exact one, {allowed:.3g} is allowed"
-            if fault:
-                where = f"{one.title}: {name} at {value!r}"
-                trial.add(0, f"{where}: degree {degree!r}, {fault}")
+def _single(_: str, value: float) -> float:
+    with np.errstate(over="ignore"):
+        return float(np.float32(value))
 
 
 _ADVICE = (
@@ -298,10 +239,10 @@ _ADVICE = (
 def edges(model: Document, runtimes: Sequence[Runtime]) -> Criterion:
     """Test each term at its mean, its edges and its ends, and beside them (N5).
 
-    Every landmark comes with the neighbouring floats, in double and in float32. On a
-    plateau, at a mean and at a point the degree is exactly what is stored; off a
-    plateau it is below 1; at an end and beyond exactly 0; elsewhere within the bound
-    of the exact one. The degrees of a system are those of its definition.
+    Every landmark comes with the neighbouring floats, in double and in float32. Where
+    the definition has the degree 1 or 0, as on a plateau, at a mean and from an end on,
+    it is exactly that; off a plateau it is below 1; elsewhere within the bound of the
+    exact one. The degrees of a system are those of its definition.
     """
     trial = Trial("N5", _ADVICE, worst=0.0)
     _try_terms(trial, model, runtimes, "terms of {}")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from fuzzytree.checking.stability.results import (
-    CurveFault,
-    OffsetCost,
+    Move,
     Stability,
     Stiff,
     Trial,
@@ -29,16 +28,21 @@ STUDY = Stability(
         Trial("N10", skipped=["a", "b", "b", "c", "d"]).result(),
     ),
     (
-        Stiff("force", 0.5, 1e6, 5e-7, 0.12, 0.1, 3, 80, 1e6, "use mixed"),
+        Stiff(
+            "force",
+            0.5,
+            1e6,
+            5e-7,
+            0.12,
+            0.1,
+            3,
+            80,
+            1e6,
+            "use mixed",
+            (Move("1 ulp", 0.25, 2, "the tip", "force 1.0, slip 0.5"),),
+        ),
         Stiff("slip", 1.0, 2.0, 0.5, 1e-7, 0.0, 0, 80, None, "float32 is safe"),
     ),
-    (
-        CurveFault(
-            *("force", "low (left)", "raw", 70.0, 0.125, 0.0, None, True),
-            "fit it with fewer points",
-        ),
-    ),
-    offsets=(OffsetCost("rules", 1e-3, None, 1e-7, 2e-16, 0, 80),),
 )
 
 TEXT = """\
@@ -63,10 +67,8 @@ N10: not tried: d
 input  spread/size  float32 costs  observed  changed  advice
 force  5.0e-07      1.2e-01        1.0e-01   3 of 80  use mixed
 slip   5.0e-01      1.0e-07        0.0e+00   0 of 80  float32 is safe
-form   spread/distance  float32  mixed    double   changed in float32
-rules  1e-03            cannot   1.0e-07  2.0e-16  -
-curve             form  size  leaves [0, 1]  rises  advice
-force low (left)  raw   70    by 0.12        -      fit it with fewer points
+input  moved by  answer moves by                  changed  most at
+force  1 ulp     2.5e-01 of the range of the tip  2 of 80  force 1.0, slip 0.5
 what to do: N3: use another one
 what to do: force: use mixed"""
 
