@@ -11,8 +11,8 @@ functions of two libraries can take two runners (`semantics.programs.bounds`).
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -25,9 +25,7 @@ from fuzzytree.model import (
     Dtype,
     FloatArray,
     FuzzySystem,
-    Model,
     Outcome,
-    RuleBase,
     Run,
     Runtime,
     kind_of,
@@ -63,21 +61,13 @@ def share(values: FloatArray) -> slice:
 
 
 class LoadedForm(msgspec.Struct, frozen=True):
-    """A form of a model in a runtime, ready to answer.
+    """A form of a model in a runtime, ready to answer."""
 
-    Attributes:
-        title: What to call it, such as `onnxruntime float32: raw rules`.
-        representation: What to call the form.
-        runtime: The runtime.
-        model: The form.
-        loud: Its answers, with the warnings that it lets out.
-    """
-
-    title: str
+    title: str  # such as `onnxruntime float32: raw rules`
     representation: str
     runtime: Runtime
     model: Document
-    loud: Run
+    loud: Run  # its answers, with the warnings that it lets out
 
     def run(self, values: FloatArray) -> Outcome:
         """Answer rows, and keep warnings in; check N4 examines them."""
@@ -176,26 +166,14 @@ def row_text(inputs: Sequence[str], values: FloatArray, row: int) -> str:
 
 
 class ExactCheck(NamedTuple):
-    """How far a runtime was from the right answers.
-
-    Attributes:
-        rows: Rows that were run.
-        worst: The largest error of a strength or output that is certain, in rows with
-            a bound; 0 for a tree.
-        allowed: The bound in the row of that error.
-        largest: The same in all rows.
-        flips: Rows whose class, or whose status, differs from the right one.
-        unbounded: Rows in which the bound proves nothing.
-        faults: What is beyond the bound, in sentences.
-        outcome: What the runtime answered.
-    """
+    """How far a runtime was from the right answers."""
 
     rows: int
-    worst: float
-    allowed: float
-    largest: float
-    flips: int
-    unbounded: int
+    worst: float  # error of a strength or output, where the bound proves something
+    allowed: float  # the bound in the row of that error
+    largest: float  # error in any row
+    flips: int  # rows whose class, or whose status, differs from the right one
+    unbounded: int  # rows in which the bound proves nothing
     faults: tuple[str, ...]
     outcome: Outcome
 
@@ -227,40 +205,16 @@ def exact_check(
     """
     right = truth(one.model, values) if right is None else right
     outcome = one.run(values)
-    if isinstance(right, Outcome):
-        return _number_check(one, values, outcome, right)
-    model: Model = one.model  # type: ignore[assignment] # what has exact decisions
-    known = ~missing_rows(model, values, one.runtime.dtype)
-    allowed = allowed_errors(one, values)
-    run = ModelRun(one.title, model, outcome)
-    errors = exact_errors(run, right, values, one.runtime.dtype, allowed)
-    flips = errors.flips & known
-    low = np.where(known, 0.0 if errors.low is None else errors.low, 0.0)
-    wrong = flips & ~errors.close | (low > allowed)
-    fault = None
+    compare = _numbers_off if isinstance(right, Outcome) else _strengths_off
+    low, allowed, is_open, wrong, flips, text = compare(one, values, outcome, right)
+    faults: tuple[str, ...] = ()
     if wrong.any():
         row = int(np.flatnonzero(wrong)[np.argmax(low[wrong])])
-        fault = f"rule {outcome.rule[row]} wins and another is right"
-        if low[row] > allowed[row]:
-            fault = f"strengths off by {low[row]:.3g}, {allowed[row]:.3g} allowed"
-        fault += f": {row_text(model.inputs, values, row)}"
-    is_open = known & (allowed >= 1.0)
-    return _exact_check(one, (low, allowed, is_open), wrong, flips, fault, outcome)
-
-
-def _exact_check(
-    one: LoadedForm,
-    errors: tuple[FloatArray, FloatArray, BoolArray],
-    wrong: BoolArray,
-    flips: BoolArray,
-    fault: str | None,
-    outcome: Outcome,
-) -> ExactCheck:
-    """Return a check, by the error of each row, its bound and whether that is open."""
-    low, allowed, is_open = errors
+        count = f"{int(wrong.sum())} of {wrong.size} rows are beyond the bound"
+        where = row_text(one.model.inputs, values, row)
+        faults = (f"{one.title}: {count}: {text(row)}: {where}",)
     bounded = np.where(is_open, 0.0, low)
     worst = int(np.argmax(bounded)) if low.size else 0
-    count = f"{int(wrong.sum())} of {wrong.size} rows are beyond the bound"
     return ExactCheck(
         int(wrong.size),
         float(bounded[worst]) if low.size else 0.0,
@@ -268,39 +222,70 @@ def _exact_check(
         float(low.max(initial=0.0)),
         int(flips.sum()),
         int(is_open.sum()),
-        () if fault is None else (f"{one.title}: {count}: {fault}",),
+        faults,
         outcome,
     )
 
 
-def _number_check(
-    one: LoadedForm, values: FloatArray, outcome: Outcome, right: Outcome
-) -> ExactCheck:
+Errors = tuple[
+    FloatArray, FloatArray, BoolArray, BoolArray, BoolArray, Callable[[int], str]
+]
+"""Of each row: the error, its bound, whether that proves nothing, whether the row is
+wrong and has another answer; and what is wrong with a row, in words."""
+
+
+def _strengths_off(
+    one: LoadedForm, values: FloatArray, outcome: Outcome, right: Any
+) -> Errors:
+    """Compare strengths and classes with exact decisions."""
+    model: Any = one.model
+    known = ~missing_rows(model, values, one.runtime.dtype)
+    allowed = np.zeros(values.shape[1])  # of a path, which has no strength
+    if model.rules:
+        own = one.runtime.bound
+        dtype: Dtype = one.runtime.dtype if own is None else "float64"
+        allowed, _ = strength_bounds(model, dtype, values)
+        allowed = np.minimum(allowed + (0.0 if own is None else own(model)[0]), 1.0)
+    run = ModelRun(one.title, model, outcome)
+    errors = exact_errors(run, right, values, one.runtime.dtype, allowed)
+    flips = errors.flips & known
+    low = np.where(known, 0.0 if errors.low is None else errors.low, 0.0)
+    wrong = flips & ~errors.close | (low > allowed)
+
+    def text(row: int) -> str:
+        if low[row] > allowed[row]:
+            return f"strengths off by {low[row]:.3g}, {allowed[row]:.3g} allowed"
+        return f"rule {outcome.rule[row]} wins and another is right"
+
+    return low, allowed, known & (allowed >= 1.0), wrong, flips, text
+
+
+def _numbers_off(
+    one: LoadedForm, values: FloatArray, outcome: Outcome, right: Any
+) -> Errors:
     """Compare all numbers of a system with the right ones."""
     gap, allowed = number_gaps(one.model, values, outcome, right)
-    wrong = np.asarray((gap > allowed).any(axis=0))
-    fault = None
-    if wrong.any():
-        excess = np.where(gap > allowed, gap, -1.0)
-        line, row = np.unravel_index(int(np.argmax(excess)), gap.shape)
-        names = [f"output {output.name!r}" for output in one.model.outputs]
-        names += [f"rule {k + 1}" for k in range(len(gap) - len(names) - 1)]
-        has_strengths = len(gap) > len(one.model.outputs) + 1
-        number, other = (
-            float(_numbers(some, has_strengths=has_strengths)[line, row])
-            for some in (outcome, right)
-        )
-        fault = f"{[*names, 'status'][line]} {number!r} where {other!r} is right, "
-        fault += f"{allowed[line, row]:.3g} allowed: "
-        fault += row_text(one.model.inputs, values, int(row))
     spans = np.ones((len(gap), 1))
     spans[: len(one.model.outputs)] = output_spans(one.model, right)
-    is_open = allowed > _EDGE * spans
-    low = np.where(is_open & (gap <= allowed), 0.0, gap)
-    worst = np.argmax(low, axis=0), np.arange(gap.shape[1])
-    errors = low[worst], allowed[worst], np.asarray(is_open.any(axis=0))
+    is_open, is_wrong = allowed > _EDGE * spans, gap > allowed
+    low = np.where(is_open & ~is_wrong, 0.0, gap)
+    worst = np.argmax(np.where(is_wrong.any(axis=0) & ~is_wrong, -1.0, low), axis=0)
+    cells = worst, np.arange(gap.shape[1])
+
+    def text(row: int) -> str:
+        line, names = int(worst[row]), [output.name for output in one.model.outputs]
+        rules = [f"rule {k + 1}" for k in range(len(gap) - len(names) - 1)]
+        names = [*(f"output {name!r}" for name in names), *rules, "status"]
+        has_strengths = bool(rules)
+        tables = [_numbers(o, has_strengths=has_strengths) for o in (outcome, right)]
+        number, other = (float(table[line, row]) for table in tables)
+        limit = f"{allowed[line, row]:.3g} allowed"
+        return f"{names[line]} {number!r} where {other!r} is right, {limit}"
+
     flips = outcome.status != right.status
-    return _exact_check(one, errors, wrong, flips, fault, outcome)
+    wrong = np.asarray(is_wrong.any(axis=0))
+    is_edge = np.asarray(is_open.any(axis=0))
+    return low[cells], allowed[cells], is_edge, wrong, flips, text
 
 
 def number_gaps(
@@ -344,18 +329,6 @@ def output_spans(model: Document, outcome: Outcome) -> FloatArray:
         if output.low is not None and output.high is not None:
             spans[line] = output.high - output.low
     return np.asarray(spans)
-
-
-def allowed_errors(one: LoadedForm, values: FloatArray) -> FloatArray:
-    """Return by how much a strength may differ from the exact one, for each row."""
-    if not isinstance(one.model, RuleBase):
-        return np.zeros(values.shape[1])
-    own = one.runtime.bound
-    dtype: Dtype = one.runtime.dtype if own is None else "float64"
-    allowed, _ = strength_bounds(one.model, dtype, values)
-    if own is not None:
-        allowed = np.minimum(allowed + own(one.model)[0], 1.0)
-    return allowed
 
 
 def missing_rows(model: Document, values: FloatArray, dtype: Dtype) -> BoolArray:

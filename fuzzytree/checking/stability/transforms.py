@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar, cast
 
 import msgspec
@@ -13,17 +13,17 @@ from fuzzytree.errors import LossError
 from fuzzytree.model import (
     Bell,
     Call,
-    Curve,
     Document,
     Dtype,
     Expression,
     Formula,
-    FuzzyTree,
     Linear,
     Name,
+    Node,
     Number,
     Part,
-    Term,
+    Sets,
+    SystemOutput,
     Value,
     Variable,
 )
@@ -42,7 +42,7 @@ NORMAL: Mapping[Dtype, tuple[int, int]] = {
 
 _PLACES = frozenset(
     ("a", "b", "c", "center", "d", "end", "high", "inflection", "left", "low", "mean")
-) | {"right", "start", "value", "values"}
+) | {"missing", "right", "start", "value"}
 _LENGTHS = frozenset(
     ("deviation", "left_deviation", "right_deviation", "spread", "width")
 )
@@ -148,74 +148,48 @@ def moved(model: AnyModel, offsets: Mapping[str, float]) -> AnyModel:
 
 def in_units(model: AnyModel, units: UnitChange) -> AnyModel:
     """Return a model with every number in the unit of a variable changed."""
-
-    def terms(name: str, old: tuple[Term, ...]) -> tuple[Term, ...]:
-        curves = [_curve(name, term.function, model, units) for term in old]
-        pairs = zip(old, curves, strict=True)
-        return tuple(msgspec.structs.replace(t, function=curve) for t, curve in pairs)
-
-    def place(name: str, value: float | None) -> float | None:
-        return None if value is None else units.place(name, value)
-
-    def variable(one: Variable) -> Variable:
-        name = one.name
-        is_whole = one.is_whole and all(
-            units.place(name, value).is_integer() for value in (0.0, 1.0)
-        )
-        return msgspec.structs.replace(
-            one,
-            terms=terms(name, one.terms),
-            low=place(name, one.low),
-            high=place(name, one.high),
-            parts=tuple(units.part(name, part) for part in one.parts),
-            missing=place(name, one.missing),
-            is_whole=is_whole,
-        )
-
-    changes: dict[str, object] = {"variables": tuple(map(variable, model.variables))}
-    for field in ("outputs", "sets"):
-        groups: tuple[Any, ...] = getattr(model, field)
-        if groups:  # outputs keep their unit, and formulas use inputs
-            changes[field] = tuple(
-                msgspec.structs.replace(
-                    one,
-                    terms=terms(getattr(one, "variable", "") or one.name, one.terms),
-                )
-                for one in groups
-            )
-    if isinstance(model, FuzzyTree):
-        changes["nodes"] = tuple(
-            msgspec.structs.replace(
-                node, cuts=tuple(units.place(node.variable, cut) for cut in node.cuts)
-            )
-            for node in model.nodes
-        )
-    return msgspec.structs.replace(model, **changes)
+    return cast("AnyModel", _in_units(model, "", model.inputs, units))
 
 
-def _curve(name: str, curve: Any, model: Document, units: UnitChange) -> Any:
-    """Return a function, or a part of one, by the names of its fields."""
-    if isinstance(curve, Formula):
-        return Formula(_expression(name, curve.expression, units))
-    if isinstance(curve, Linear):
-        pairs = zip(model.inputs, curve.weights, strict=True)
-        parts = [units.part("", Part(one, weight, 0.0)) for one, weight in pairs]
-        offset = curve.offset - sum(part.weight * part.centre for part in parts)
-        return Linear(tuple(part.weight for part in parts), offset)
+def _in_units(old: Any, name: str, inputs: Sequence[str], units: UnitChange) -> Any:
+    """Return a part of a model, of the variable of a name, by the names of fields."""
+    match old:
+        case tuple():
+            return tuple(_in_units(one, name, inputs, units) for one in old)
+        case Part():
+            return units.part(name, old)
+        case Formula(expression=expression):
+            return Formula(_expression(name, expression, units))
+        case Linear(weights=weights, offset=offset):
+            pairs = zip(inputs, weights, strict=True)
+            parts = [units.part("", Part(one, weight, 0.0)) for one, weight in pairs]
+            offset -= sum(part.weight * part.centre for part in parts)
+            return Linear(tuple(part.weight for part in parts), offset)
+        case Variable() | SystemOutput():
+            name = old.name
+        case Node() | Sets():
+            name = old.variable
+        case Value():
+            pass
+        case _:
+            return old
     changes: dict[str, object] = {}
-    for field in curve.__struct_fields__:
-        old = getattr(curve, field)
-        if isinstance(old, Value):
-            changes[field] = _curve(name, old, model, units)
-        elif field == "values":
-            changes[field] = tuple(units.place(name, value) for value in old)
-        elif field in _PLACES and old is not None:
-            changes[field] = units.place(name, old)
+    for field in old.__struct_fields__:
+        value = getattr(old, field)
+        if field in ("cuts", "values"):
+            changes[field] = tuple(units.place(name, one) for one in value)
+        elif field in _PLACES and isinstance(value, float):
+            changes[field] = units.place(name, value)
         elif field in _LENGTHS:
-            changes[field] = units.length(name, old)
-        elif field == "slope" and not isinstance(curve, Bell):
-            changes[field] = units.part("", Part(name, old, 0.0)).weight
-    return msgspec.structs.replace(curve, **changes)
+            changes[field] = units.length(name, value)
+        elif field == "slope" and not isinstance(old, Bell):
+            changes[field] = units.part("", Part(name, value, 0.0)).weight
+        elif field == "is_whole":
+            ends = (units.place(name, value) for value in (0.0, 1.0))
+            changes[field] = value and all(end.is_integer() for end in ends)
+        else:
+            changes[field] = _in_units(value, name, inputs, units)
+    return msgspec.structs.replace(old, **changes)
 
 
 def _expression(variable: str, formula: Expression, units: UnitChange) -> Expression:
@@ -237,33 +211,32 @@ def numbers_in_units(model: Document) -> Iterator[tuple[str, int, float]]:
     divide by those.
     """
     numbers: list[tuple[str, int, float]] = []
+    places: list[float] = []
 
-    def keep(name: str, value: float) -> float:
+    def length(name: str, value: float) -> float:
         numbers.append((name, 1, value))
         return value
 
+    def place(name: str, value: float) -> float:
+        places.append(value)
+        return length(name, value)
+
     def part(_: str, one: Part) -> Part:
         numbers.append((one.input, -1, one.weight))
-        keep(one.input, one.centre)
+        length(one.input, one.centre)
         return one
 
-    in_units(model, UnitChange(keep, keep, part))
-    yield from numbers
+    units = UnitChange(place, length, part)
+    in_units(model, units)
     groups = [(variable.name, variable.terms) for variable in model.variables]
     groups += [(group.variable, group.terms) for group in model.sets]
     for name, terms in groups:
         for term in terms:
-            places = sorted(_places(term.function))
-            yield from ((name, 1, b - a) for a, b in itertools.pairwise(places))
-
-
-def _places(curve: Curve) -> Iterator[float]:
-    for field in _PLACES.intersection(curve.__struct_fields__):
-        value = getattr(curve, field)
-        if field == "values":
-            yield from cast("tuple[float, ...]", value)
-        elif isinstance(value, float):
-            yield value
+            places.clear()
+            _in_units(term, name, model.inputs, units)
+            pairs = itertools.pairwise(sorted(places))
+            numbers += [(name, 1, b - a) for a, b in pairs]
+    yield from numbers
 
 
 def exponent_range(model: Document, dtype: Dtype) -> tuple[int, int]:
