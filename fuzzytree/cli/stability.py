@@ -35,11 +35,11 @@ class StabilityOptions(TableOptions, FullResultOptions):
 @click.command("stability", short_help="Check that a model is numerically stable.")
 @takes(StabilityOptions)
 def command(options: StabilityOptions) -> int:
-    """Apply the stability checks N1 to N10 to MODEL, a YAML file.
+    """Apply the stability checks N1 to N10 to MODEL, a tree, rules or a fuzzy system.
 
     They require equal bits in other units, orders and batches, exact edges, errors
     within the certified bounds, and curves that can be evaluated; the price of float32
-    is reported for each input. Exit 1 if a check fails.
+    and how far answers move are reported for each input. Exit 1 if a check fails.
     """
     from fuzzytree import api
     from fuzzytree.report import stability_lines

@@ -105,6 +105,7 @@ _ADVICE_SCALING = (
     "in between; use one whose steps are differences, quotients and comparisons"
 )
 _NO_INPUT = "the model has no input"
+_ONE_INPUT = "a model of one input has no features apart"
 
 
 def scaling(
@@ -116,17 +117,8 @@ def scaling(
     model stays normal; last, every input has a k of its own.
     """
     trial = Trial("N1", _ADVICE_SCALING)
-    count = len(model.inputs)
-    if not count:
-        trial.skipped.append(_NO_INPUT)
-        return trial.result()
     ranges: dict[str, list[tuple[int, int]]] = {}
-    for one in loaded_forms(model, runtimes, trial.skipped):
-        low, high = exponent_range(one.model, one.runtime.dtype)
-        if low > high:
-            why = f"{one.title}: its numbers span more than the type does"
-            trial.skipped.append(why)
-            continue
+    for one, low, high in _ranges(trial, model, runtimes, 1, 0):
         axes = "float32" if one.runtime.dtype == "float32" else "double"
         ranges.setdefault(axes, []).append((low, high))
         ks = [k for k in _STEPS if low < k < high]
@@ -134,8 +126,8 @@ def scaling(
         ks += [] if one.runtime.bound is not None else [low, high]
         middle, chance = min(max(0, low), high), random.Random(0)
         ends = max(low, middle - 60), min(high, middle + 60)
-        for plan in (*([k] * count for k in ks), None):
-            plan = plan or [chance.randint(*ends) for _ in model.inputs]
+        plans = [[k] * len(model.inputs) for k in ks]
+        for plan in (*plans, [chance.randint(*ends) for _ in model.inputs]):
             trial.add(*_scaled(one, plan, values, trial.skipped))
     facts: list[str] = []
     for name, every in ranges.items():
@@ -152,22 +144,29 @@ def decades(
     The inputs of one combination are spread as well.
     """
     trial = Trial("N2b", _ADVICE_SCALING)
-    count = len(model.inputs)
-    if count < 2:
-        trial.skipped.append("a model of one input has no features apart")
-        return trial.result()
-    places = [int(place) for place in np.linspace(0, _DECADES, count)]
+    places = [int(place) for place in np.linspace(0, _DECADES, len(model.inputs))]
     random.Random(0).shuffle(places)
+    for one, low, high in _ranges(trial, model, runtimes, 2, _DECADES):
+        start = min(max(-_DECADES // 2, low), high - _DECADES)
+        plan = [start + place for place in places]
+        trial.add(*_scaled(one, plan, values, trial.skipped))
+    return trial.result()
+
+
+def _ranges(
+    trial: Trial, model: Document, runtimes: Sequence[Runtime], fewest: int, width: int
+) -> Iterator[tuple[LoadedForm, int, int]]:
+    """Yield each form with the exponents by which its inputs can be scaled."""
+    if len(model.inputs) < fewest:
+        trial.skipped.append(_NO_INPUT if fewest == 1 else _ONE_INPUT)
+        return
     for one in loaded_forms(model, runtimes, trial.skipped):
         low, high = exponent_range(one.model, one.runtime.dtype)
-        start = min(max(-_DECADES // 2, low), high - _DECADES)
-        if start < low:
-            why = f"{one.title}: its own numbers leave no room for 20 decades"
-            trial.skipped.append(why)
+        if high - low >= width:
+            yield one, low, high
         else:
-            plan = [start + place for place in places]
-            trial.add(*_scaled(one, plan, values, trial.skipped))
-    return trial.result()
+            why = "leave no room for 20 decades" if width else "span more than the type"
+            trial.skipped.append(f"{one.title}: its own numbers {why}")
 
 
 def _scaled(

@@ -91,8 +91,12 @@ def stiffness(
     for line, name in enumerate(model.inputs):
         scale, here = scales[name], near[line]
         reach = 1e-9 * ((scale.high - scale.low) or scale.location)
-        with np.errstate(over="ignore"):  # beyond float32 is missing
+        with np.errstate(over="ignore"):  # what is beyond a type is missing
             single = move(line, "float32", here.astype(np.float32).astype(np.float64))
+            moves = (
+                move(line, "1 ulp", np.nextafter(here, np.inf)),
+                move(line, "1e-9 of its range", here + reach),
+            )
         predicted = scale.slope * scale.location * UNIT
         offset = _offset(scale)
         is_safe = max(predicted, scale.curves) <= SAFE
@@ -111,10 +115,7 @@ def stiffness(
                 near.shape[1],
                 None if is_safe else offset,
                 _advice(scale, predicted, offset, is_safe=is_safe),
-                (
-                    move(line, "1 ulp", np.nextafter(here, np.inf)),
-                    move(line, "1e-9 of its range", here + reach),
-                ),
+                moves,
             )
         )
     return tuple(sorted(records, key=lambda one: (-one.predicted, -one.observed)))
