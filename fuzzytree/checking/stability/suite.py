@@ -7,12 +7,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from fuzzytree.checking.comparing import row_set
-from fuzzytree.checking.stability.exactness import exactness, offsets
+from fuzzytree.checking.stability.exactness import degenerate, edges, exactness, offsets
 from fuzzytree.checking.stability.results import TITLES, Criterion, Stability, Trial
-from fuzzytree.checking.stability.roundtrips import roundtrips
-from fuzzytree.checking.stability.row_checks import decades, order, scaling, specials
+from fuzzytree.checking.stability.row_checks import (
+    decades,
+    order,
+    roundtrips,
+    scaling,
+    specials,
+)
 from fuzzytree.checking.stability.sensitivity import curves, stiffness
-from fuzzytree.checking.stability.term_checks import degenerate, edges
 from fuzzytree.model import (
     Document,
     FloatArray,

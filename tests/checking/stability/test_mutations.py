@@ -8,11 +8,15 @@ import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.checking.stability.exactness import exactness, offsets
-from fuzzytree.checking.stability.roundtrips import roundtrips
-from fuzzytree.checking.stability.row_checks import decades, order, scaling, specials
+from fuzzytree.checking.stability.exactness import degenerate, edges, exactness, offsets
+from fuzzytree.checking.stability.row_checks import (
+    decades,
+    order,
+    roundtrips,
+    scaling,
+    specials,
+)
 from fuzzytree.checking.stability.sensitivity import curves
-from fuzzytree.checking.stability.term_checks import degenerate, edges
 from fuzzytree.exporters.table import find_format
 from fuzzytree.model.contracts import Model, Runtime
 from fuzzytree.model.rulebase import LR, Band, Side, Term

@@ -9,17 +9,16 @@ import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import numpy as np
 import pytest
 
-from fuzzytree.checking.stability.exactness import exactness, offsets
-from fuzzytree.checking.stability.roundtrips import roundtrips
+from fuzzytree.checking.stability.exactness import degenerate, edges, exactness, offsets
 from fuzzytree.checking.stability.row_checks import (
     _with_specials,
     order,
+    roundtrips,
     scaling,
     specials,
 )
 from fuzzytree.checking.stability.sensitivity import stiffness
 from fuzzytree.checking.stability.suite import examine
-from fuzzytree.checking.stability.term_checks import degenerate, edges
 from fuzzytree.checking.stability.transforms import moved, scaled
 from fuzzytree.exporters.table import all_formats, find_format
 from fuzzytree.model.contracts import Runtime
