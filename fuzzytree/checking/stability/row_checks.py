@@ -241,7 +241,7 @@ def specials(
     if not model.inputs:
         trial.skipped.append(_NO_INPUT)
         return trial.result()
-    rows = _with_specials(model, values)
+    rows = special_rows(model, values)
     first: FirstOutcomes = {}
     for one in loaded_forms(model, runtimes, trial.skipped):
         tried = one.some(rows)
@@ -259,7 +259,7 @@ def specials(
     return trial.result()
 
 
-def _with_specials(model: Document, values: FloatArray) -> FloatArray:
+def special_rows(model: Document, values: FloatArray) -> FloatArray:
     """Return rows in which one input at a time has each special value, and all have.
 
     The values beyond an input's range, where degrees end, are among them.

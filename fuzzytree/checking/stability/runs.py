@@ -315,9 +315,9 @@ def number_gaps(
 def _numbers(outcome: Outcome, *, has_strengths: bool) -> FloatArray:
     """Return all numbers of a system in the order of its program's results."""
     strengths = outcome.strengths if has_strengths else None
-    parts = (outcome.outputs, strengths, outcome.status[np.newaxis])
-    table: FloatArray = np.vstack([part for part in parts if part is not None])
-    return table
+    status = outcome.status[np.newaxis].astype(np.float64)
+    parts = (outcome.outputs, strengths, status)
+    return np.vstack([part for part in parts if part is not None])
 
 
 def output_spans(model: Document, outcome: Outcome) -> FloatArray:

@@ -246,7 +246,9 @@ def exponent_range(model: Document, dtype: Dtype) -> tuple[int, int]:
     number of the type, so that nothing but the exponents changes.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase
+        >>> from fuzzytree.model.rulebase import (
+        ...     Band, Proposition, Rule, RuleBase, Term
+        ... )
         >>> step = Term("low", Band(high=1.0))
         >>> rule = Rule((Proposition("x", ("low",)),), "a")
         >>> rules = RuleBase("one", ("a",), (Variable("x", (step,)),), (rule,))

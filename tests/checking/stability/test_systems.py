@@ -11,10 +11,10 @@ import pytest
 
 from fuzzytree.checking.stability.exactness import degenerate, edges, exactness, offsets
 from fuzzytree.checking.stability.row_checks import (
-    _with_specials,
     order,
     roundtrips,
     scaling,
+    special_rows,
     specials,
 )
 from fuzzytree.checking.stability.sensitivity import stiffness
@@ -100,13 +100,13 @@ def test_n6_finds_a_number_that_is_lost_or_invented(
 
 
 def test_n6_tries_degrees_of_almost_0_and_sums_that_overflow(rows: FloatArray) -> None:
-    tried = defects.NATIVE.load(FAN)(_with_specials(FAN, rows)).strengths
+    tried = defects.NATIVE.load(FAN)(special_rows(FAN, rows)).strengths
     assert tried is not None
     tiny = tried[(tried > 0.0) & (tried < 1e-290)]
     assert tiny.size
     assert (tried == 0.0).all(axis=0).any()
     linear = SYSTEMS["Sugeno, linear"]
-    table = _with_specials(linear, probe_values(linear, 100))
+    table = special_rows(linear, probe_values(linear, 100))
     numbers = defects.NATIVE.load(linear)(table).outputs
     assert numbers is not None
     assert (np.abs(numbers) > 1e300).any()
