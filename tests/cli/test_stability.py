@@ -9,7 +9,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.model.rulebase import LR, Side, Term
-from tests.checking.stability.defects import one_rule
+from tests.checking.stability.defects import mamdani, one_rule
 from tests.cli.conftest import Call
 
 NATIVE = ("--runtime", "native", "--runtime", "native float32")
@@ -53,6 +53,18 @@ def test_json_reports_the_same_facts(call: Call) -> None:
     assert facts["ok"] is True
     assert [one["code"] for one in facts["criteria"]] == ["N3"]
     assert facts["runtimes"] == ["native", "native float32"]
+
+
+def test_a_fuzzy_system_is_examined_like_rules(call: Call) -> None:
+    words = ("--select", "N3", "--select", "N5", "--select", "N8", *NATIVE)
+    ft.save(mamdani(), "fan.yaml")
+    code, out, err = call("stability", "fan.yaml", *words)
+    assert (code, err) == (0, "")
+    assert out.startswith("fan: 3 of 3 stability checks pass, none fails (")
+    assert "float32 is safe for 2 of 2 inputs" in out
+    jump = out.splitlines()[-1]  # where the default ends
+    assert jump.startswith("heat   1 ulp     ")
+    assert " of the range of fan " in jump
 
 
 @pytest.mark.parametrize(

@@ -189,19 +189,12 @@ MOST_TERMS = 240
 
 
 class TermProbes(msgspec.Struct, frozen=True):
-    """A model whose strengths are degrees, and the rows to run.
+    """A model whose strengths are degrees, and the rows to run."""
 
-    Attributes:
-        model: It has one rule for each term.
-        values: Shape (inputs, rows).
-        places: For each rule the variable and the term that it tests, and the function.
-        left_out: How many terms are not tested, for there are too many.
-    """
-
-    model: Document
-    values: FloatArray
-    places: tuple[tuple[str, str, Curve], ...]
-    left_out: int
+    model: Document  # with one rule for each term
+    values: FloatArray  # of shape (inputs, rows)
+    places: tuple[tuple[str, str, Curve], ...]  # of each rule: variable, term, function
+    left_out: int  # how many terms are not tested, for there are too many
 
 
 def term_probes(

@@ -49,20 +49,14 @@ _LENGTHS = frozenset(
 
 
 class UnitChange(msgspec.Struct, frozen=True):
-    """How the numbers of a model change with the units of its variables.
+    """How the numbers of a model change with the units of its variables."""
 
-    Attributes:
-        place: A value of a variable: cuts, ends, means, ranges.
-        length: A distance on it: spreads.
-        part: A summand of a combination, by the combination's name; of a linear
-            conclusion, and a slope, by no name.
-        name: What a formula uses for a value in the unit of a variable.
-    """
-
-    place: Change
-    length: Change
+    place: Change  # of a value of a variable: cuts, ends, means, ranges
+    length: Change  # of a distance on it: spreads
     part: Callable[[str, Part], Part]
+    """Of a summand, by its combination; of a linear conclusion or slope, by no name."""
     name: Callable[[str, Name], Expression] = lambda _, name: name
+    """What a formula uses for a value in the unit of a variable."""
 
 
 def scaled(model: AnyModel, exponents: Mapping[str, int]) -> AnyModel:
