@@ -50,15 +50,8 @@ class Reach(NamedTuple):
         return self.low <= 0.0 <= self.high
 
 
-_COPIES = frozenset(("where", "minimum", "maximum", "negate", "absolute", "pick"))
-"""Operations whose results are numbers that are there before, or their negatives."""
-
-
-def reaches(program: Program, *, may_overflow: bool) -> list[Reach]:
-    """Return how far each step reaches where all inputs are finite.
-
-    Where numbers may not overflow, what would be infinite is none.
-    """
+def reaches(program: Program) -> list[Reach]:
+    """Return how far each step reaches where all inputs are finite."""
     results: list[Reach] = []
     for step, still in zip(program.steps, still_results(program), strict=True):
         operands = [results[place] for place in step.arguments]
@@ -68,12 +61,8 @@ def reaches(program: Program, *, may_overflow: bool) -> list[Reach]:
         reach = _reach(step, operands)
         if any(not one.is_sure for one in operands):
             reach = reach._replace(is_sure=False)
-        low, high, least, is_sure = reach
-        is_new = step.operation not in _COPIES
-        if reach.size == math.inf and is_new and not may_overflow:
-            low, high, is_sure = max(low, -LARGEST), min(high, LARGEST), False
-        least = least if least >= _SMALLEST else _SMALLEST
-        results.append(Reach(low, high, least, is_sure))
+        least = reach.least if reach.least >= _SMALLEST else _SMALLEST
+        results.append(reach._replace(least=least))
     return results
 
 

@@ -5,8 +5,8 @@ used more than once, and is long, becomes a column; anything else stands where i
 used. NULL stands for NaN, for engines compare NaN in their own ways.
 
 An engine that raises an error where a number overflows would fail all rows for one. So
-there a `CASE` stands around what may, as far as the numbers reach: what underflows is 0
-as elsewhere, and what overflows is NULL.
+there a `CASE` stands around what may, as far as the numbers reach, and gives infinity
+or 0 as other engines do.
 """
 
 from __future__ import annotations
@@ -30,14 +30,23 @@ from fuzzytree.semantics import Program, Step, still_results
 _DEEPEST = 60  # levels of an expression
 _LONGEST = 4  # operations that a repetition may cost
 _MOST_ARGUMENTS = 60  # of one function; SQLite takes 100
-_SAFE = "8e307"  # below the largest double, by a factor that no rounding makes up for
-_UP, _DOWN = repr(2.0**537), repr(2.0**-538)
-_TINY = {  # each product here is exact, for it has a power of two
-    "multiply": f"LEAST(ABS({{0}}), ABS({{1}}), {2.0**-500!r}) * {_UP} * "
-    f"(LEAST(GREATEST(ABS({{0}}), ABS({{1}})), 1e0) * {_UP}) <= 0.5e0",
-    "divide": f"LEAST(ABS({{0}}), 1e0) * {_UP} <= GREATEST(ABS({{1}}), 1e0) * {_DOWN}",
+_HUGE: Mapping[str, str] = {
+    "add": "SIGN({0}) = SIGN({1}) AND LEAST(ABS({0}), ABS({1})) - "
+    f"({LARGEST} - GREATEST(ABS({{0}}), ABS({{1}}))) >= {2.0**970!r}",
+    "multiply": f"GREATEST(ABS({{0}}), 1e0) * {2.0**-512!r} * "
+    f"(GREATEST(ABS({{1}}), 1e0) * {2.0**-512!r}) >= 1e0",
+    "divide": f"GREATEST(ABS({{0}}), {2.0**-500!r}) * {2.0**-512!r} >= "
+    f"LEAST(ABS({{1}}), 1e0) * {2.0**512!r}",
 }
-"""Whether a product or quotient is rounded to 0."""
+"""Whether a sum, product or quotient is rounded to an infinity."""
+_TINY: Mapping[str, str] = {
+    "multiply": f"LEAST(ABS({{0}}), ABS({{1}}), {2.0**-500!r}) * {2.0**537!r} * "
+    f"(LEAST(GREATEST(ABS({{0}}), ABS({{1}})), 1e0) * {2.0**537!r}) <= 0.5e0",
+    "divide": f"LEAST(ABS({{0}}), 1e0) * {2.0**537!r} <= "
+    f"GREATEST(ABS({{1}}), 1e0) * {2.0**-538!r}",
+}
+"""Whether a product or quotient is rounded to 0. Factors of powers of two are exact,
+and so chosen that nothing here overflows or underflows itself."""
 REMEDY = "take fewer samples or rules, or write C, JavaScript or Python"
 
 _SIGNS: Mapping[str, str] = {
@@ -59,7 +68,7 @@ _FUNCTIONS: Mapping[str, tuple[str, float, float]] = {
     "floor": ("FLOOR", -math.inf, math.inf),
     "ceiling": ("CEILING", -math.inf, math.inf),
     "square_root": ("SQRT", 0.0, math.inf),
-    "exponential": ("EXP", -745.0, 709.0),
+    "exponential": ("EXP", -745.13, 709.782712893384),
     "logarithm": ("LN", math.ulp(0.0), math.inf),
     "logarithm_10": ("LOG10", math.ulp(0.0), math.inf),
     "sine": ("SIN", -LARGEST, LARGEST),
@@ -68,8 +77,8 @@ _FUNCTIONS: Mapping[str, tuple[str, float, float]] = {
     "arc_sine": ("ASIN", -1.0, 1.0),
     "arc_cosine": ("ACOS", -1.0, 1.0),
     "arc_tangent": ("ATAN", -math.inf, math.inf),
-    "hyperbolic_sine": ("SINH", -709.0, 709.0),
-    "hyperbolic_cosine": ("COSH", -709.0, 709.0),
+    "hyperbolic_sine": ("SINH", -710.4758600739439, 710.4758600739439),
+    "hyperbolic_cosine": ("COSH", -710.4758600739439, 710.4758600739439),
     "hyperbolic_tangent": ("TANH", -math.inf, math.inf),
     "area_sine": ("ASINH", -math.inf, math.inf),
     "area_cosine": ("ACOSH", 1.0, math.inf),
@@ -89,11 +98,12 @@ _LOG1P = """\
 CASE WHEN {0} <= -1e0 THEN NULL WHEN 1e0 + {0} = 1e0 THEN {0}
     ELSE LN(1e0 + {0}) * ({0} / ((1e0 + {0}) - 1e0)) END"""  # W. Kahan
 _POWER = """\
-CASE WHEN {1} = 0e0 THEN 1e0::float8
-    WHEN {0} = 0e0 THEN CASE WHEN {1} > 0e0 THEN 0e0::float8 END
-    WHEN ABS({1}) BETWEEN 1e-200 AND 1e200 AND ({0} > 0e0 OR {1} = FLOOR({1}))
-    THEN CASE WHEN {1} * LN(ABS({0})) < -745e0 THEN 0e0::float8
-    WHEN {1} * LN(ABS({0})) < 709e0 THEN POWER({0}, {1}) END END"""
+CASE WHEN ABS({1}) < 1e-200 THEN 1e0::float8
+    WHEN {0} = 0e0 THEN CASE WHEN {1} > 0e0 THEN 0e0::float8 ELSE @ END
+    WHEN ABS({1}) <= 1e200 AND ({0} > 0e0 OR {1} = FLOOR({1})) THEN
+    CASE WHEN {1} * LN(ABS({0})) < -745e0 THEN 0e0::float8
+    WHEN {1} * LN(ABS({0})) < 709.78e0 THEN POWER({0}, {1})
+    WHEN {0} < 0e0 AND {1} / 2e0 <> FLOOR({1} / 2e0) THEN -@ ELSE @ END END"""
 
 
 class SqlSteps:
@@ -112,7 +122,7 @@ class SqlSteps:
     ) -> None:
         self.query, self.program, self.steps = query, program, program.steps
         self.still = still_results(program)
-        self.reaches = reaches(program, may_overflow=not query.is_strict)
+        self.reaches = reaches(program)
         self.operands = [step.arguments for step in self.steps]
         self.templates = [self._template(place) for place in range(len(self.steps))]
         self.levels: list[list[tuple[int, str, str]]] = []
@@ -129,8 +139,7 @@ class SqlSteps:
         for place in self._results:
             uses[place] = uses.get(place, 0) + 1
         for place in range(len(self.steps) - 1, -1, -1):
-            for number, one in enumerate(self.operands[place]):
-                count = self.templates[place].count(f"{{{number}}}")
+            for one, count in self._mentions(place):
                 if place in uses and count:
                     uses[one] = uses.get(one, 0) + count
         sizes: dict[int, int] = {}
@@ -142,7 +151,8 @@ class SqlSteps:
                 self._level[place] = 0
                 continue
             operands = self.operands[place]
-            sizes[place] = 1 + sum(sizes.get(one, 0) for one in operands)
+            inner_sizes = [n * sizes.get(one, 0) for one, n in self._mentions(place)]
+            sizes[place] = 1 + sum(inner_sizes)
             is_flat = step.operation in ("minimum", "maximum", "where")
             inner = [depths.get(one, 0) for one in operands]
             inner = inner if is_flat else [0, *(1 + one for one in inner)]
@@ -155,6 +165,11 @@ class SqlSteps:
             if comment or is_long or depths[place] > _DEEPEST:
                 self._add_column(place, comment)
                 sizes[place] = depths[place] = 0
+
+    def _mentions(self, place: int) -> Iterator[tuple[int, int]]:
+        """Yield the operands of a step, and how often its text has each."""
+        for number, one in enumerate(self.operands[place]):
+            yield one, self.templates[place].count(f"{{{number}}}")
 
     def _add_text(self, place: int) -> None:
         needs: frozenset[int] = frozenset()
@@ -262,11 +277,11 @@ class SqlSteps:
                 )
             case operation if operation in _FUNCTIONS:
                 return self._function(operation, operands)
-            case operation if query.is_strict:
-                return self._guarded(step, operands)
             case operation:
                 text = _SIGNS.get(operation) or self._other(operation)
-                if operation == "divide" and operands[1].has_zero:
+                if query.is_strict:
+                    text = self._guarded(step, operands)
+                elif operation == "divide" and operands[1].has_zero:
                     text = self._quotient()
                 is_known = step.kind == "truth" or is_defined(step, operands)
                 return text if is_known else query.known(text)
@@ -309,9 +324,12 @@ class SqlSteps:
         if not tests:
             return text
         rest = ""
-        if operation == "exponential":
-            rest = f" WHEN {{0}} < {query.number(low)} THEN 0e0"
-        elif name.startswith("L") and not query.is_strict:
+        if operation in _OVERFLOWING:
+            base = "{0}" if operation == "hyperbolic_sine" else "ABS({0})"
+            rest = f" ELSE {base} * {query.number(math.inf)}"
+            if operation == "exponential":
+                rest = f" WHEN {{0}} < 0e0 THEN 0e0{rest}"
+        elif name.startswith("L"):
             rest = f" WHEN {{0}} = 0e0 THEN {query.number(-math.inf)}"
         return f"CASE WHEN {' AND '.join(tests)} THEN {text}{rest} END"
 
@@ -333,40 +351,40 @@ class SqlSteps:
                     f"cannot write {self.program.name} as sql for {self.query.target}: "
                     f"a formula has a remainder, which the dialect has of decimals only"
                 )
-            case _ if self.query.dialect == "spark":
-                return "CASE WHEN {1} <> 0e0 THEN {0} % {1} END"
+            case _ if self.query.dialect == "sqlite":
+                return "MOD({0}, {1})"
             case _:
-                return (
-                    "MOD({0}, {1})"
-                    if self.query.dialect == "sqlite"
-                    else "FMOD({0}, {1})"
-                )
+                return "CASE WHEN {1} <> 0e0 THEN {0} % {1} END"
 
     def _guarded(self, step: Step, operands: Sequence[Reach]) -> str:
         """Return an operation that raises no error in PostgreSQL."""
         is_large, is_small = overflows(step, operands), underflows(step, operands)
-        operation = step.operation
+        operation, infinity = step.operation, self.query.number(math.inf)
         if operation == "power":
             is_plain = operands[0].low >= 0.0 and operands[1].low >= 0.0
             is_plain = is_plain and not is_large and not is_small
-            return "POWER({0}, {1})" if is_plain else _POWER
+            return "POWER({0}, {1})" if is_plain else _POWER.replace("@", infinity)
         text = _SIGNS.get(operation) or self._other(operation)
         cases: list[str] = []
-        if operation == "divide" and operands[1].has_zero:
-            cases.append("{1} = 0e0 OR {1} IS NULL THEN NULL")
+        a, *others = operands
+        if operation == "divide" and a.size == others[0].size == math.inf:
+            both = "ABS({0}) = @ AND ABS({1}) = @ THEN NULL"
+            cases.append(both.replace("@", infinity))
+        if operation == "divide" and others[0].has_zero:
+            cases.append(f"{{1}} = 0e0 THEN SIGN({{0}}) * {infinity}")
         if is_large and operation in ("add", "subtract"):
-            cases.append(f"ABS({{0}}) > {_SAFE} OR ABS({{1}}) > {_SAFE} THEN NULL")
-        if is_large and operation == "multiply":
-            cases.append(f"ABS({{0}}) > {_SAFE} / GREATEST(ABS({{1}}), 1e0) THEN NULL")
-        if is_large and operation == "divide":
-            cases.append(f"ABS({{0}}) > {_SAFE} * LEAST(ABS({{1}}), 1e0) THEN NULL")
-        if is_small and operation in ("multiply", "divide"):
+            test = _HUGE["add"]
+            if operation == "subtract":
+                test = test.replace("SIGN({1})", "-SIGN({1})")
+            cases.append(f"{test} THEN SIGN({{0}}) * {infinity}")
+        elif is_large and operation in _HUGE:
+            sign = f"SIGN({{0}}) * SIGN({{1}}) * {infinity}"
+            cases.append(f"{_HUGE[operation]} THEN {sign}")
+        if is_small and operation in _TINY:
             if not all(one.is_sure for one in operands):
                 cases.append("{0} IS NULL OR {1} IS NULL THEN NULL")
             cases.append(f"{_TINY[operation]} THEN 0e0")
-        if not cases:
-            return text
-        return f"CASE WHEN {' WHEN '.join(cases)} ELSE {text} END"
+        return f"CASE WHEN {' WHEN '.join(cases)} ELSE {text} END" if cases else text
 
     def queries(self, kept: Sequence[str]) -> Iterator[str]:
         """Yield a query for each level, behind `columns`, with what is needed later.

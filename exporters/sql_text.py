@@ -176,9 +176,9 @@ class Query:
 
     def known(self, text: str) -> str:
         """Return an expression with NULL where it is NaN."""
-        if self.dialect not in ("duckdb", "spark"):
-            return text  # SQLite knows no NaN, and what is written else makes none
-        return f"NULLIF({text}, CAST('NaN' AS DOUBLE))"
+        if self.target in ("sqlite", "tsql"):
+            return text  # these know no NaN
+        return f"NULLIF({text}, CAST('NaN' AS {self.double}))"
 
 
 def _is_decimal(value: float) -> bool:
