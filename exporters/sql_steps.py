@@ -129,6 +129,7 @@ class SqlSteps:
         self._results = results
         self._names: dict[int, str] = {}
         self._texts: dict[int, str] = {}
+        self._raw: set[int] = set()  # texts that may be NaN and not NULL
         self._parts: dict[int, list[str]] = {}  # arguments of a minimum or maximum
         self._needs: dict[int, frozenset[int]] = {}  # the columns that a text names
         self._level: dict[int, int] = {}  # the queries before it
@@ -136,12 +137,15 @@ class SqlSteps:
 
     def _add_columns(self, comments: Mapping[int, str]) -> None:
         uses: dict[int, int] = {}
+        compared = {*self._results}
         for place in self._results:
             uses[place] = uses.get(place, 0) + 1
         for place in range(len(self.steps) - 1, -1, -1):
             for one, count in self._mentions(place):
                 if place in uses and count:
                     uses[one] = uses.get(one, 0) + count
+                    if self.steps[place].operation not in _PASSING:
+                        compared.add(one)
         sizes: dict[int, int] = {}
         depths: dict[int, int] = {}
         for place in sorted(one for one in uses if self.still[one] is None):
@@ -162,6 +166,7 @@ class SqlSteps:
             comment = comments.get(place, comment)
             is_long = (uses[place] - 1) * sizes[place] > _LONGEST
             self._add_text(place)
+            is_long = is_long or (place in self._raw and place in compared)
             if comment or is_long or depths[place] > _DEEPEST:
                 self._add_column(place, comment)
                 sizes[place] = depths[place] = 0
@@ -178,11 +183,21 @@ class SqlSteps:
         self._needs[place] = needs
         self._level[place] = max((self._level[one] for one in needs), default=0)
         self._texts[place] = self._expression(place)
+        step, operands = self.steps[place], self.operands[place]
+        is_raw = step.operation in _PASSING and not self._raw.isdisjoint(operands)
+        reached = [self.reaches[one] for one in operands]
+        is_new = step.kind == "number" and not step.table
+        is_new = is_new and not is_defined(step, reached)
+        if (is_raw or is_new) and not self.query.is_strict:
+            self._raw.add(place)
 
     def _add_column(self, place: int, comment: str) -> None:
         text, level = self._texts.pop(place), self._level[place]
         if self.steps[place].kind == "truth":
             text = f"CASE WHEN {text} THEN 1 ELSE 0 END"
+        elif place in self._raw:
+            text = self.query.known(text)
+            self._raw.remove(place)
         self._names[place] = f"v_{len(self._names) + 1}"
         if level == len(self.levels):
             self.levels.append([])
@@ -284,7 +299,7 @@ class SqlSteps:
                 elif operation == "divide" and operands[1].has_zero:
                     text = self._quotient()
                 is_known = step.kind == "truth" or is_defined(step, operands)
-                return text if is_known else query.known(text)
+                return text if is_known or not query.is_strict else query.known(text)
 
     def _end(self, operation: str, a: Reach, b: Reach) -> str:
         """Return the smaller or larger of two numbers; of equal ones the second."""
@@ -449,5 +464,9 @@ class SqlSteps:
             )
 
 
+_PASSING = frozenset(
+    ("add", "subtract", "multiply", "divide", "negate", "absolute", "where")
+)
+"""Operations that make NaN of NaN."""
 _CHOICES = {"{0}": 0, "{1}": 1}
 _ENDS = frozenset(("min", "max", "LEAST", "GREATEST"))
