@@ -35,3 +35,4 @@ from .table import is_installed as is_installed
 from .table import needed_by as needed_by
 from .written import ENGINES as ENGINES
 from .written import Options as Options
+from .written import system_numbers as system_numbers

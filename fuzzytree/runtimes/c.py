@@ -164,8 +164,29 @@ def load_best_first(model: Model, *, with_strengths: bool = False) -> Run:
 def _load_system(system: FuzzySystem, *, with_strengths: bool) -> Run:
     """Return a function that answers rows of a fuzzy system by compiled C."""
     file = write_c(system, name="model", activations=with_strengths, selftest=False)
-    speed = "-O0" if len(file.content) > _LONG else "-O2"
-    infer = compiled(file.content, _INFER_LOOP, 2, speed)
+    return load_system_content(file.content, system, with_strengths=with_strengths)
+
+
+def load_system_content(
+    content: bytes,
+    system: FuzzySystem,
+    *,
+    prefix: str = "model",
+    with_strengths: bool = True,
+) -> Run:
+    """Return the same for a file that `fuzzytree.exporters.c` wrote of a system.
+
+    `prefix` is the beginning of all names in the file, which gives activations if
+    `with_strengths`.
+
+    Raises:
+        MissingExtraError: As `load`.
+        FuzzyTreeError: As `load`.
+    """
+    speed = "-O0" if len(content) > _LONG else "-O2"
+    loop = _INFER_LOOP.replace("model_", f"{prefix}_")
+    loop = loop.replace("MODEL_", f"{prefix.upper()}_")
+    infer = compiled(content, loop, 2, speed, f"{prefix}_many")
     count = len(system.outputs) + with_strengths * len(system.rules)
 
     def run(values: FloatArray) -> Outcome:

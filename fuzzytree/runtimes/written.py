@@ -26,7 +26,9 @@ from fuzzytree.columns import BOOLEANS
 from fuzzytree.errors import FuzzyTreeError, MissingExtraError
 from fuzzytree.exporters import beginning
 from fuzzytree.model import (
+    Document,
     FloatArray,
+    FuzzySystem,
     Model,
     Option,
     Outcome,
@@ -65,10 +67,10 @@ width, classes = facts["width"], facts["classes"]
 rows, found = array.array("d"), array.array("d")
 rows.frombytes(open("rows.bin", "rb").read())
 for row in range(facts["count"]):
-    label, *numbers = answer(rows[row * width : (row + 1) * width].tolist())
-    found.append(-1 if label is None else classes.index(label))
-    found.extend(numbers[:2])
-    found.extend(numbers[2] if len(numbers) > 2 else ())
+    for part in answer(rows[row * width : (row + 1) * width].tolist()):
+        if part is None or isinstance(part, str):
+            part = -1 if part is None else classes.index(part)
+        found.extend(part if isinstance(part, list) else [part])
 open("found.bin", "wb").write(found.tobytes())
 """
 _NODE = """
@@ -170,7 +172,19 @@ def _c(
 def _sql(
     content: bytes, model: Model, options: Options, values: FloatArray
 ) -> ProgramOutcome:
-    """Answer by the standard library's sqlite3, or by duckdb, in memory."""
+    labels: list[str | None] = []
+    rows: list[Sequence[Any]] = []
+    for label, *numbers in _queried(content, model, options, values):
+        labels.append(label)
+        rows.append(numbers)
+    outcome = outcome_of(model, rows, has_probabilities=_is_rated(options))
+    return ProgramOutcome(outcome, tuple(labels))
+
+
+def _queried(
+    content: bytes, model: Document, options: Options, values: FloatArray
+) -> list[Sequence[Any]]:
+    """Return what stands behind the inputs, by sqlite3 or by duckdb, in memory."""
     dialect = options.get("dialect", "sqlite")
     if dialect == "duckdb":
         _need("duckdb", "running SQL of the dialect duckdb")
@@ -179,7 +193,7 @@ def _sql(
     else:
         connection, failure = sqlite3.connect(":memory:"), sqlite3.Error
     try:
-        return _queried(connection, content, model, options, values)
+        return _answers(connection, content, model, options, values)
     except failure as error:
         text = f"{dialect} cannot run it: {str(error).splitlines()[0]}"
         raise FuzzyTreeError(text) from error
@@ -187,13 +201,13 @@ def _sql(
         connection.close()
 
 
-def _queried(
+def _answers(
     connection: Any,
     content: bytes,
-    model: Model,
+    model: Document,
     options: Options,
     values: FloatArray,
-) -> ProgramOutcome:
+) -> list[Sequence[Any]]:
     """Return the answers of a query to a table with rows, categories as their names."""
     inputs = [one for one in model.variables if not one.parts]
     table = _quoted(str(options.get("table", "data")))
@@ -208,12 +222,10 @@ def _queried(
     kept = ([_known_cells(row[:width]) for row in some] for some in (rows, result))
     if operator.ne(*kept):
         raise FuzzyTreeError("it does not give each row with its inputs, in order")
-    answers = [row[width + 1 :] for row in result]
-    outcome = outcome_of(model, answers, has_probabilities=_is_rated(options))
-    return ProgramOutcome(outcome, tuple(row[width] for row in result))
+    return [row[width:] for row in result]
 
 
-def _row_name(model: Model) -> str:
+def _row_name(model: Document) -> str:
     """Return the name of one more column, so that a table has one at least."""
     return unlike("row", set(model.inputs))
 
@@ -242,9 +254,8 @@ def _known_cells(row: Sequence[object]) -> tuple[object, ...]:
     return tuple(None if cell != cell else cell for cell in row)
 
 
-def _pmml(
-    content: bytes, model: Model, options: Options, values: FloatArray
-) -> ProgramOutcome:
+def _evaluated(content: bytes, model: Document, values: FloatArray) -> Any:
+    """Return a table of what JPMML-Evaluator gives for each row."""
     for package in ("jpmml_evaluator", "pandas"):
         _need(package, "running PMML")
     if shutil.which("java") is None:
@@ -255,7 +266,13 @@ def _pmml(
     numbers = {_row_name(model): range(values.shape[1])}
     columns = dict(zip(model.inputs, values, strict=True))
     table = pandas.DataFrame(numbers | columns)
-    result = evaluator.evaluateAll(table, error_col=None)[0]
+    return evaluator.evaluateAll(table, error_col=None)[0]
+
+
+def _pmml(
+    content: bytes, model: Model, options: Options, values: FloatArray
+) -> ProgramOutcome:
+    result = _evaluated(content, model, values)
     labels = tuple(None if one != one else one for one in result["answer"])
     names = [f"strength of rule {k}" for k in range(1, len(model.rules) + 1)]
     is_rated = _is_rated(options)
@@ -281,6 +298,53 @@ def _need(package: str, purpose: str) -> None:
     if importlib.util.find_spec(package) is None:
         text = f"{purpose} needs the package {package!r}, which is not installed"
         raise MissingExtraError(text)
+
+
+def system_numbers(
+    content: bytes,
+    form: str,
+    system: FuzzySystem,
+    options: Options,
+    values: FloatArray,
+) -> FloatArray:
+    """Run the program of a fuzzy system by an engine of its language.
+
+    Args:
+        content: The file.
+        form: The name of its format: `c`, `python`, `javascript`, `sql` or `pmml`.
+        system: What it was written of.
+        options: The options that it was written with.
+        values: Shape (inputs, rows).
+
+    Returns:
+        Shape (results, rows): the outputs, the status, and the activations if the
+        program gives them; of PMML, which has no status, the outputs alone.
+
+    Raises:
+        MissingExtraError: If the engine is not installed.
+        FuzzyTreeError: If the program fails.
+        KeyError: If there is no engine for the format.
+    """
+    outputs = [one.name for one in system.outputs]
+    match form:
+        case "python" | "javascript":
+            return numbers_of(content, form, values, ()).T
+        case "c":
+            is_fired = options.get("activations") is True
+            prefix = beginning(system.name, cast("str | None", options.get("name")))
+            run = c.load_system_content(
+                content, system, prefix=prefix, with_strengths=is_fired
+            )
+            outcome = run(values)
+            parts = [outcome.outputs, outcome.status.reshape(1, -1), outcome.strengths]
+            return np.vstack([part for part in parts if part is not None])
+        case "sql":
+            return np.array(_queried(content, system, options, values), np.float64).T
+        case "pmml":
+            table = _evaluated(content, system, values)[outputs]
+            return np.asarray(table.to_numpy(dtype=np.float64, na_value=np.nan)).T
+        case _:
+            raise KeyError(form)
 
 
 ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(

@@ -11,9 +11,11 @@ import pytest
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.sql import write
+from fuzzytree.exporters.sql_text import Dialect
 from fuzzytree.model.contracts import Model, Outcome
 from fuzzytree.model.rulebase import (
     Band,
+    Points,
     Proposition,
     Rule,
     RuleBase,
@@ -21,9 +23,17 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.model.rules import Conclusion, SystemRule
+from fuzzytree.model.system import (
+    Defuzzifier,
+    FuzzySystem,
+    RuleBlock,
+    SystemOutput,
+)
 from fuzzytree.runtimes.table import find_runtime
+from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.testing import probe_values, random_tree, with_points
+from fuzzytree.testing import probe_values, random_system, random_tree, with_points
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
@@ -163,6 +173,82 @@ def test_what_engines_do_not_hold_is_refused() -> None:
         "Python"
     )
     assert len(write(many, dialect="duckdb").content) > 100_000
+
+
+def fan(samples: int) -> FuzzySystem:
+    """Return a system of one output, whose curve is looked at so many times."""
+    ends = (0.0, 10.0)
+    terms = (
+        Term("low", Points(ends, (1.0, 0.0))),
+        Term("middle", Points((0.0, 5.0, 10.0), (0.0, 1.0, 0.0))),
+        Term("high", Points(ends, (0.0, 1.0))),
+    )
+    output = SystemOutput(
+        "speed", terms, *ends, Defuzzifier("centroid", samples), "maximum"
+    )
+    rules = tuple(
+        SystemRule(Proposition("heat", (one.name,)), (Conclusion("speed", one.name),))
+        for one in terms
+    )
+    return FuzzySystem(
+        "fan",
+        (Variable("heat", terms),),
+        (output,),
+        (RuleBlock(rules, implication="minimum"),),
+    )
+
+
+def test_a_system_gives_its_outputs_and_the_status_and_its_activations() -> None:
+    connection = sqlite3.connect(":memory:")
+    connection.execute("CREATE TABLE data (heat)")
+    connection.execute("INSERT INTO data VALUES (2.5), (NULL), (1e300), ('warm')")
+    cursor = connection.execute(write(fan(100), strengths=True).content.decode())
+    names = ["heat", "speed", "status", *(f"activation_{k}" for k in (1, 2, 3))]
+    assert [column[0] for column in cursor.description] == names
+    rows = [[*row[1:]] for row in cursor]
+    right = infer(fan(100), {"heat": 2.5})
+    assert rows[0] == [right.outputs[0], 0, 0.75, 0.5, 0.25]
+    assert rows[1] == rows[3] == [None, 3, *[None] * 3]
+    assert rows[2][1] == 0
+
+
+def test_too_many_samples_are_refused_with_the_number_that_is_needed() -> None:
+    with pytest.raises(LossError) as refused:
+        write(fan(2_500))
+    assert str(refused.value) == (
+        "cannot write fan as sql for sqlite: a step of it has 2502 columns, and SQLite "
+        "takes 2000; take fewer samples or rules, or write C, JavaScript or Python"
+    )
+    assert write(fan(1_900)).content
+    with pytest.raises(
+        LossError, match="1702 columns, and PostgreSQL takes 1664; take"
+    ):
+        write(fan(1_700), dialect="postgresql")
+    assert write(fan(2_500), dialect="duckdb").content
+    pytest.importorskip("sqlglot")
+    with pytest.raises(LossError, match=r"bytes, and ClickHouse takes 262,144; take"):
+        write(fan(800), dialect="clickhouse")
+
+
+@pytest.mark.parametrize(
+    "dialect", ["bigquery", "snowflake", "tsql", "clickhouse", "trino"]
+)
+def test_translated_dialects_are_marked_and_parsed(dialect: Dialect) -> None:
+    sqlglot = pytest.importorskip("sqlglot")
+    rules = rules_from_tree(random_tree(2))
+    for model in (random_tree(2), rules, random_system(2), fan(20)):
+        written = write(model, dialect=dialect, keep=["row"])
+        text = written.content.decode()
+        assert "-- Not executed by fuzzytree: sqlglot translated" in text
+        assert "did not execute it" in written.remarks[0]
+        (query,) = sqlglot.parse(text, read=dialect)
+        names = [one.alias_or_name for one in query.selects]
+        shown = (
+            [one.name for one in model.outputs]
+            if isinstance(model, FuzzySystem)
+            else ["class", "rule"]
+        )
+        assert names == ["row", *shown, "status"]
 
 
 def test_a_wrong_option_is_a_sentence() -> None:

@@ -10,7 +10,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,8 +25,10 @@ from fuzzytree.model.contracts import Model, Outcome
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import system_probes
 from fuzzytree.tables import read_table
-from fuzzytree.testing import probe_values
+from fuzzytree.testing import probe_values, random_system
+from tests.runtimes.test_written_systems import within
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
@@ -123,16 +125,11 @@ def postgresql() -> Iterator[list[str]]:
         shutil.rmtree(home)
 
 
-@pytest.mark.heavy
-@pytest.mark.parametrize("name", MODELS)
-def test_postgresql_answers_with_our_bits(name: str, postgresql: list[str]) -> None:
-    model = MODELS[name]
-    values = _rows(model)
-    # Where others answer infinity or 0, PostgreSQL raises an error: see `cannot`.
-    is_usual = ~((np.abs(values) > 1e100) & np.isfinite(values)).any(axis=0)
-    values = values[:, is_usual]
-    right = find_runtime("reference").load(model)(values)
-    columns = "".join(f', "{column}" DOUBLE PRECISION' for column in model.inputs)
+def _answers(
+    psql: list[str], names: Sequence[str], values: FloatArray, query: str
+) -> list[list[str]]:
+    """Return the rows of a query, in order, to a table with these values."""
+    columns = "".join(f', "{name}" DOUBLE PRECISION' for name in names)
     lines = [
         f"{number}," + ",".join(map(repr, row))
         for number, row in enumerate(values.T.tolist())
@@ -143,18 +140,41 @@ def test_postgresql_answers_with_our_bits(name: str, postgresql: list[str]) -> N
             "COPY wine FROM STDIN WITH (FORMAT csv);",
             *lines,
             "\\.",
-            _query(model, "postgresql") + "ORDER BY row;",
+            query + "ORDER BY row;",
         ]
     )
     done = subprocess.run(
-        postgresql, input=script, capture_output=True, text=True, cwd="/", timeout=300
+        psql, input=script, capture_output=True, text=True, cwd="/", timeout=300
     )
     assert done.stderr == ""
-    found = [
-        [None if cell == "" else float(cell) for cell in row[2:]]
-        for row in csv.reader(io.StringIO(done.stdout))
-        if row
-    ]
+    return [row for row in csv.reader(io.StringIO(done.stdout)) if row]
+
+
+@pytest.mark.heavy
+def test_postgresql_has_the_numbers_of_systems_and_no_row_fails_another(
+    postgresql: list[str],
+) -> None:
+    for seed in range(24):
+        system = random_system(seed)
+        rows = system_probes(system, limit=80)
+        values = np.array([[row[name] for name in system.inputs] for row in rows]).T
+        assert (np.abs(values) == 1.7976931348623157e308).any()
+        query = write(
+            system, dialect="postgresql", table="wine", keep="row", strengths=True
+        ).content.decode()
+        cells = _answers(postgresql, system.inputs, values, query)
+        numbers = [[float(x or "nan") for x in row[1:]] for row in cells]
+        within(system, values, np.array(numbers).T)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", MODELS)
+def test_postgresql_answers_with_our_bits(name: str, postgresql: list[str]) -> None:
+    model = MODELS[name]
+    values = _rows(model)
+    right = find_runtime("reference").load(model)(values)
+    rows = _answers(postgresql, model.inputs, values, _query(model, "postgresql"))
+    found = [[None if x == "" else float(x) for x in row[2:]] for row in rows]
     _assert_equal(found, right)
 
 
