@@ -416,21 +416,24 @@ class SqlSteps:
             for place, _, _ in columns:
                 for one in self._needs[place]:
                     last[one] = max(last.get(one, 0), level)
-        for level, columns in enumerate(self.levels):
-            carried = [
+        carried = [
+            [
                 name
                 for place, name in self._names.items()
                 if self._level[place] <= level and last.get(place, -1) > level
             ]
-            self.check_columns(len(kept) + len(carried) + len(columns))
+            for level in range(len(self.levels))
+        ]
+        widths = [len(a) + len(b) for a, b in zip(carried, self.levels, strict=True)]
+        self.check_columns(len(kept) + max(widths, default=0))
+        for level, columns in enumerate(self.levels):
             yield self.query.step(f"level_{level + 1}")
             yield "  SELECT"
-            if kept or carried:
-                names = textwrap.fill(
-                    ", ".join([*kept, *carried]), 88, initial_indent="  ",
-                    subsequent_indent="  ", break_long_words=False,
-                )  # fmt: skip
-                yield f"{names},"
+            if names := [*kept, *carried[level]]:
+                text = textwrap.fill(
+                    ", ".join(names), 88, initial_indent="  ", subsequent_indent="  "
+                )
+                yield f"{text},"
             for number, (place, text, comment) in enumerate(columns, 1):
                 comma = "," if number < len(columns) else ""
                 remark = f" -- {comment!r}" if comment else ""

@@ -11,7 +11,7 @@ import pytest
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.sql import write
-from fuzzytree.exporters.sql_text import Dialect
+from fuzzytree.exporters.sql_text import LIMITS, Dialect, Limit
 from fuzzytree.model.contracts import Model, Outcome
 from fuzzytree.model.rulebase import (
     Band,
@@ -23,13 +23,8 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.rules import Conclusion, SystemRule
-from fuzzytree.model.system import (
-    Defuzzifier,
-    FuzzySystem,
-    RuleBlock,
-    SystemOutput,
-)
+from fuzzytree.model.rules import Conclusion, RuleBlock, SystemRule
+from fuzzytree.model.system import Defuzzifier, FuzzySystem, SystemOutput
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -168,7 +163,7 @@ def test_what_engines_do_not_hold_is_refused() -> None:
     with pytest.raises(LossError) as refused:
         write(many)
     assert str(refused.value) == (
-        "cannot write many as sql for sqlite: a step of it has 2002 columns, and "
+        "cannot write many as sql for sqlite: a step of it has 2003 columns, and "
         "SQLite takes 2000; take fewer samples or rules, or write C, JavaScript or "
         "Python"
     )
@@ -225,9 +220,15 @@ def test_too_many_samples_are_refused_with_the_number_that_is_needed() -> None:
     ):
         write(fan(1_700), dialect="postgresql")
     assert write(fan(2_500), dialect="duckdb").content
+
+
+def test_a_query_that_is_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("sqlglot")
-    with pytest.raises(LossError, match=r"bytes, and ClickHouse takes 262,144; take"):
-        write(fan(800), dialect="clickhouse")
+    monkeypatch.setitem(LIMITS, "clickhouse", Limit("ClickHouse", length=5_000))
+    with pytest.raises(
+        LossError, match="bytes, and ClickHouse takes 5,000; take fewer"
+    ):
+        write(fan(20), dialect="clickhouse")
 
 
 @pytest.mark.parametrize(
