@@ -35,6 +35,7 @@ from fuzzytree.semantics import (
     Program,
     Step,
     from_system,
+    unrolled,
 )
 
 MOST_FIELDS = 20_000
@@ -105,58 +106,34 @@ class SystemFields:
     """
 
     def __init__(self, system: FuzzySystem, taken: set[str]) -> None:
-        program = from_system(system)
-        if program.size > MOST_FIELDS:
+        samples = from_system(system)
+        if samples.size > MOST_FIELDS:
             raise LossError(
-                f"cannot write {system.name} as pmml: it would need {program.size:,} "
+                f"cannot write {system.name} as pmml: it would need {samples.size:,} "
                 f"fields, and engines handle no more than {MOST_FIELDS:,} well"
             )
+        program = unrolled(samples)
         _refuse_unknown(system.name, program)
         self.is_inexact = any(step.operation in INEXACT for step in program.steps)
         self.functions: dict[str, XmlElement] = {}
         self.fields: list[XmlElement] = []
         self._prefix = _prefix(taken)
-        values: list[list[Value]] = []
+        values: list[Value] = []
         for place, step in enumerate(program.steps):
-            values.append(self._values(place, step, values))
-        self.outputs: list[XmlElement] = []
-        for place in program.of("output"):
-            (result,) = values[place]
-            self.outputs.append(_expression(result))
+            operands = [values[argument] for argument in step.arguments]
+            values.append(self._value(f"{place}", step, operands))
+        self.outputs = [_expression(values[place]) for place in program.of("output")]
 
-    def _values(self, place: int, step: Step, values: list[list[Value]]) -> list[Value]:
-        """Return the value of a step, or one for each of its samples."""
-        operands = [values[argument] for argument in step.arguments]
+    def _value(self, name: str, step: Step, operands: list[Value]) -> Value:
         match step.operation:
             case "constant":
-                return [step.number]
+                return step.number
             case "input":
-                return [ref(step.name)]
-            case "index":
-                return [float(k) for k in range(step.samples)]
-            case "total":
-                return [self._total(place, operands[0])]
-            case "running":
-                return self._running(place, "add", operands[0])
-            case "last":
-                return operands[0][-1:]
-            case "highest" | "lowest":
-                operation = "maximum" if step.operation == "highest" else "minimum"
-                return self._running(place, operation, operands[0])[-1:]
+                return ref(step.name)
             case "below" | "pick":
-                return [
-                    self._field(f"{place} {k}", _table(step, value), "number")
-                    for k, value in enumerate(operands[0])
-                ]
-            case _:
-                return [
-                    self._one(
-                        f"{place} {k}" if step.samples else f"{place}",
-                        step.operation,
-                        [one[k] if len(one) > 1 else one[0] for one in operands],
-                    )
-                    for k in range(step.samples or 1)
-                ]
+                return self._field(name, _table(step, operands[0]), "number")
+            case operation:
+                return self._one(name, operation, operands)
 
     def _one(self, name: str, operation: str, operands: list[Value]) -> Value:
         """Return an operation on some values, as a field unless it is known now."""
@@ -179,27 +156,6 @@ class SystemFields:
         how = TRUTH if kind == "truth" else NUMBER
         self.fields.append(element("DerivedField", expression, name=full, **how))
         return ref(full)
-
-    def _total(self, place: int, samples: list[Value]) -> Value:
-        """Return the sum by halves, as `programs.operations.total` has it."""
-        size = 1 << (len(samples) - 1).bit_length()
-        level = [*samples, *([0.0] * (size - len(samples)))]
-        count = 0
-        while len(level) > 1:
-            half = len(level) // 2
-            added: list[Value] = []
-            for a, b in zip(level[:half], level[half:], strict=True):
-                added.append(self._one(f"{place} {count}", "add", [a, b]))
-                count += 1
-            level = added
-        return level[0]
-
-    def _running(self, place: int, operation: str, samples: list[Value]) -> list[Value]:
-        """Return an operation on the samples up to each."""
-        result = samples[:1]
-        for k, one in enumerate(samples[1:]):
-            result.append(self._one(f"{place} {k}", operation, [result[-1], one]))
-        return result
 
     def _define(self, operation: str) -> None:
         """Define an operation, for numbers that may be missing."""
@@ -246,8 +202,7 @@ def step_value(
 
 def _refuse_unknown(name: str, program: Program) -> None:
     known = {*_PLAIN, *_PARTIAL, *_COMPARED, *_LOGIC, "negate", "is_finite", "where"}
-    known |= {"constant", "input", "index", "total", "running", "last"}
-    known |= {"highest", "lowest", "below", "pick"}
+    known |= {"constant", "input", "below", "pick"}
     unknown = sorted({step.operation for step in program.steps} - known)
     if unknown:
         words = ", ".join(one.replace("_", " ") for one in unknown)
