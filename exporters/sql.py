@@ -107,8 +107,11 @@ def write(
             _refuse_deep(model)
             lines = _tree(query, model)
         case RuleBase():
-            kinds: list[ResultKind] = ["strength"] if strengths else []
-            kinds += ["probability"] if probabilities else []
+            kinds: list[ResultKind] = []
+            if strengths:
+                kinds.append("strength")
+            if probabilities:
+                kinds.append("probability")
             lines = _rules(query, model, kinds)
         case FuzzySystem():
             lines = _system(query, model, activations=strengths)

@@ -219,7 +219,7 @@ class SqlSteps:
     def _operand(self, place: int) -> str:
         """Return a value as part of an expression."""
         still = self.still[place]
-        if isinstance(still, float) and not isinstance(still, bool):
+        if isinstance(still, float):
             return self.query.number(still)
         return f"({self.value(place)})" if self._is_open(place) else self.value(place)
 

@@ -85,7 +85,7 @@ class Query:
     """
 
     def __init__(self, dialect: Dialect, table: str, keep: tuple[str, ...]) -> None:
-        self.target = dialect
+        self.target: Dialect = dialect
         self.is_translated = dialect in TRANSLATED
         self.dialect = "postgresql" if self.is_translated else dialect
         self.is_strict = self.dialect == "postgresql"

@@ -194,7 +194,7 @@ def load_system_content(
         rows = inputs.shape[1]
         numbers, status = np.empty((count, rows)), np.empty(rows, np.int64)
         infer(_at(inputs), rows, _at(numbers), _at(status))
-        return system_outcome(system, np.vstack([numbers, status]))
+        return system_outcome(system, np.vstack([numbers, status.astype(np.float64)]))
 
     return run
 

@@ -336,7 +336,8 @@ def system_numbers(
                 content, system, prefix=prefix, with_strengths=is_fired
             )
             outcome = run(values)
-            parts = [outcome.outputs, outcome.status.reshape(1, -1), outcome.strengths]
+            status = outcome.status.reshape(1, -1).astype(np.float64)
+            parts = outcome.outputs, status, outcome.strengths
             return np.vstack([part for part in parts if part is not None])
         case "sql":
             return np.array(_queried(content, system, options, values), np.float64).T

@@ -40,7 +40,8 @@ def within(system: FuzzySystem, values: FloatArray, numbers: FloatArray) -> int:
     right = run_system(system)(values)
     assert right.outputs is not None
     assert right.strengths is not None
-    wanted = np.vstack([right.outputs, right.status, right.strengths])
+    status = right.status.reshape(1, -1).astype(np.float64)
+    wanted = np.vstack([right.outputs, status, right.strengths])
     program = from_system(system, activations=True)
     kinds = [one.kind for one in program.results]
     order = [

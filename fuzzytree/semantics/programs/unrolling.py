@@ -22,7 +22,7 @@ def unrolled(program: Program) -> Program:
         >>> total = make("total", make.input("x") * make.index(3))
         >>> program = make.program("p", ("x",), (result_of("output", "y", total),))
         >>> [step.operation for step in unrolled(program).steps]
-        ['input', 'constant', 'multiply', 'constant', 'multiply', 'add', 'add']
+        ['input', 'constant', 'constant', 'multiply', 'multiply', 'add', 'add']
     """
     make = Maker()
     rows: list[list[Place]] = []
