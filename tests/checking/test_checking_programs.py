@@ -114,7 +114,8 @@ def test_options_that_a_file_cannot_have_are_a_disagreement() -> None:
     (one,) = (c for c in checked(TREE, "m.sql").comparisons if c.basis == "file")
     assert one.detail == (
         "the model cannot be written as sql: dialect: must be sqlite, duckdb, "
-        "postgresql, spark, not 'klingon'",
+        "postgresql, spark, bigquery, snowflake, tsql, clickhouse, trino, not "
+        "'klingon'",
     )
 
 
