@@ -125,13 +125,9 @@ def write(
             f"cannot write {model.name} as sql for {dialect}: it has {length:,} bytes, "
             f"and {limit.engine} takes {limit.length:,}; {REMEDY}"
         )
-    remarks = {
-        "postgresql": ("PostgreSQL answers NULL where a number overflows",),
-        **dict.fromkeys(
-            TRANSLATED, (f"{limit.engine} did not execute it: {_UNTRIED}",)
-        ),
-    }
-    return Written(text.encode("utf-8"), remarks=remarks.get(dialect, ()))
+    remark = f"{limit.engine} did not execute it: {_UNTRIED}"
+    remarks = (remark,) if query.is_translated else ()
+    return Written(text.encode("utf-8"), remarks=remarks)
 
 
 _UNTRIED = "sqlglot translated and parsed the query for PostgreSQL, which is tested"
@@ -307,7 +303,7 @@ FORMAT = Format(
     cannot=(
         "an sql file runs, but is not read back as a model",
         "more columns in a step, or bytes, than the engine takes by its documentation",
-        "remainders in formulas in the dialects from PostgreSQL on",
+        "remainders in formulas, but in the dialects sqlite, duckdb and spark",
         f"the dialects {', '.join(sorted(TRANSLATED))} are not executed here",
     ),
     dtype="float64",
