@@ -146,6 +146,7 @@ def write_c(
     name: str | None = None,
     activations: bool = False,
     probabilities: bool = False,
+    tables: bool = False,
     selftest: bool = True,
 ) -> Written:
     """Return a model as the text of a C file, in ASCII.
@@ -163,6 +164,9 @@ def write_c(
             stands behind the outputs.
         probabilities: Of a rule base that has them: whether the file also offers
             `NAME_probabilities(answer, strengths, probabilities)`.
+        tables: Of a fuzzy system: whether curves of outputs are tables of all samples,
+            which is some three times as quick, and larger; else they are where that
+            is smaller.
         selftest: Whether the file also holds a program that tests it, which is what
             takes most of the time to write.
 
@@ -185,12 +189,16 @@ def write_c(
     if isinstance(model, FuzzySystem):
         if dtype != "float64":
             raise ValueError("fuzzy systems are written in float64 only")
-        parts = _system_text(model, activations=activations, selftest=selftest)
+        parts = _system_text(
+            model, activations=activations, tables=tables, selftest=selftest
+        )
         body = "".join(parts)
         text = "".join(_heading(model, source)) + fill(body, prefix)
         return Written(text.encode("ascii"))
     if activations:
         raise ValueError("activations are those of fuzzy systems")
+    if tables:
+        raise ValueError("tables are those of fuzzy systems")
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, "c float32", lost)
@@ -215,7 +223,7 @@ def beginning(own: str, name: str | None) -> str:
 
 
 def _system_text(
-    system: FuzzySystem, *, activations: bool, selftest: bool
+    system: FuzzySystem, *, activations: bool, tables: bool, selftest: bool
 ) -> Iterator[str]:
     """Yield what stands behind the heading of a system."""
     yield _USE + _DECLARE
@@ -225,7 +233,7 @@ def _system_text(
     yield f"#define NAME_OUTPUTS {count}u\n"
     yield SYSTEM_TYPES + _DEFINE
     yield _checks(DOUBLE, is_arithmetic=True)
-    yield from system_code(system, activations=activations)
+    yield from system_code(system, activations=activations, tables=tables)
     if selftest:
         yield from system_selftest(system, activations=activations)
     yield "\n#endif\n"

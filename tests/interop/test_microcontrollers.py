@@ -1,0 +1,126 @@
+"""Controllers in C for small machines: bits, sizes, and what the machines answer."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fuzzytree.exporters.c import write_c
+from fuzzytree.formats import read_fll
+from fuzzytree.model import FuzzySystem
+from fuzzytree.runtimes.table import find_runtime
+from fuzzytree.semantics import error_bounds, from_system, infer, system_probes
+from fuzzytree.testing import random_system
+
+Need = Callable[[str], str]
+FAN = """\
+Engine: fan
+InputVariable: temperature
+  range: 0.0 40.0
+  term: cold Triangle -1.0 5.0 20.0
+  term: mild Triangle 8.0 20.0 31.0
+  term: hot Triangle 22.0 33.0 41.0
+InputVariable: humidity
+  range: 0.0 100.0
+  term: dry Triangle -1.0 15.0 50.0
+  term: normal Triangle 20.0 50.0 80.0
+  term: wet Triangle 50.0 85.0 101.0
+OutputVariable: speed
+  range: 0.0 100.0
+  aggregation: Maximum
+  defuzzifier: Centroid 100
+  term: low Triangle 0.0 20.0 45.0
+  term: medium Triangle 30.0 50.0 70.0
+  term: high Triangle 55.0 80.0 100.0
+RuleBlock: rules
+  conjunction: Minimum
+  disjunction: Maximum
+  implication: Minimum
+  activation: General
+"""
+METHODS = (
+    "Centroid 100",
+    "Centroid 128",
+    "Bisector 100",
+    "MeanOfMaximum 100",
+    "SmallestOfMaximum 100",
+    "LargestOfMaximum 33",
+)
+CORTEX = "arm-none-eabi-gcc -mthumb -std=c99 -Os -fstack-usage -c"
+MACHINES = {
+    "Cortex-M4": f"{CORTEX} -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16",
+    "Cortex-M0": f"{CORTEX} -mcpu=cortex-m0",
+    "ATmega328P": "avr-gcc -mmcu=atmega328p -std=c99 -Os -fstack-usage -c",
+}
+
+
+def fan(method: str = METHODS[0]) -> FuzzySystem:
+    """Return a Mamdani controller of nine rules on two inputs."""
+    text = FAN.replace(METHODS[0], method)
+    labels = ("low", "low", "medium", "low", "medium", "high", "medium", "high", "high")
+    pairs = [(a, b) for a in ("cold", "mild", "hot") for b in ("dry", "normal", "wet")]
+    for (a, b), label in zip(pairs, labels, strict=True):
+        when = f"temperature is {a} and humidity is {b}"
+        text += f"  rule: if {when} then speed is {label}\n"
+    system = read_fll(text.encode(), "fan.fll").model
+    assert isinstance(system, FuzzySystem)
+    return system
+
+
+def size_of(folder: Path, content: bytes, machine: str) -> tuple[int, int]:
+    """Return the bytes of code and constants, and of the stack, without libraries."""
+    source, target = folder / "model.c", folder / "model.o"
+    source.write_bytes(content)
+    words = [*MACHINES[machine].split(), str(source), "-o", str(target)]
+    subprocess.run(words, check=True)
+    size = words[0].replace("-gcc", "-size")
+    done = subprocess.run([size, target], capture_output=True, text=True, check=True)
+    text, data, bss = map(int, done.stdout.splitlines()[1].split()[:3])
+    assert bss == 0
+    usage = target.with_suffix(".su").read_text()
+    return text + data, sum(map(int, re.findall(r"\t(\d+)\t", usage)))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_array_on_the_stack_holds_all_samples(method: str) -> None:
+    text = write_c(fan(method), selftest=False).content.decode()
+    sizes = re.findall(r"    fan_real \w+\[(\d+)\];", text)
+    assert all(int(size) <= 8 for size in sizes)
+    assert "static const double" not in text
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("method", [*METHODS, "random"])
+def test_samples_in_another_order_have_the_references_bits(
+    program: Need, method: str
+) -> None:
+    program("gcc")
+    is_random = method == "random"
+    for system in map(random_system, range(24)) if is_random else [fan(method)]:
+        rows = system_probes(system, limit=100)
+        values = np.array([[row[name] for row in rows] for name in system.inputs])
+        values = values.reshape(len(system.inputs), len(rows))
+        outcome = find_runtime("c").load(system)(values)
+        assert outcome.outputs is not None
+        expected = np.array([infer(system, row).outputs for row in rows]).T
+        bounds = error_bounds(from_system(system), values)[: len(expected)]
+        is_alike = outcome.outputs.view(np.int64) == expected.view(np.int64)
+        is_alike |= np.isnan(outcome.outputs) & np.isnan(expected)
+        assert (is_alike | (bounds > 0.0)).all()
+        assert is_random or not bounds.any()
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("machine", ["Cortex-M4", "Cortex-M0"])
+def test_a_controller_of_nine_rules_is_small(
+    tmp_path: Path, program: Need, machine: str
+) -> None:
+    program("arm-none-eabi-gcc")
+    flash, stack = size_of(tmp_path, write_c(fan(), selftest=False).content, machine)
+    assert 1000 < flash <= 2500
+    assert 100 < stack <= 300
