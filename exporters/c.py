@@ -13,16 +13,16 @@ from typing import Literal
 
 from fuzzytree.exporters.c_rules import probability_code, rules_code
 from fuzzytree.exporters.c_selftest import number_of, selftest_code
-from fuzzytree.exporters.c_steps import (
-    SYSTEM_TYPES,
-    system_code,
-    system_selftest,
-)
+from fuzzytree.exporters.c_systems import system_text
 from fuzzytree.exporters.c_tables import CModel
 from fuzzytree.exporters.c_text import (
+    DECLARE,
+    DEFINE,
     DOUBLE,
     SINGLE,
+    USE,
     CNumbers,
+    checks,
     constants,
     fill,
     integer_type,
@@ -54,51 +54,6 @@ from fuzzytree.model import (
 from fuzzytree.numerics import losses
 
 _NUMBERS = {"float64": DOUBLE, "float32": SINGLE}
-
-_USE = """\
- *
- * Compile this file; where its functions are called, include it behind
- * #define NAME_HEADER, which leaves the declarations. With -DNAME_SELFTEST it is a
- * program that compares its answers with the expected ones; it returns 0 if all equal.
- */
-
-"""
-
-_DECLARE = "#ifndef NAME_DECLARED\n#define NAME_DECLARED\n\n"
-
-_DEFINE = "\n#endif\n\n#ifndef NAME_HEADER\n\n"
-
-_LIMITS = """\
-#include <float.h>
-#include <stdint.h>
-
-#if FLT_RADIX != 2 || LIMITS
-#error "KIND is no IEEE number here"
-#endif
-"""
-
-_ARITHMETIC = """\
-/* Each operation must be rounded once, to KIND. */
-#if defined(FLT_EVAL_METHOD)
-#if !(EVALUATION)
-#error "numbers have other digits here: on x86 compile with -msse2 -mfpmath=sse"
-#endif
-#elif !defined(__TINYC__) || defined(__i386__)
-#error "float.h of C99 must define FLT_EVAL_METHOD"
-#endif
-#if defined(__FAST_MATH__)
-#error "compile without -ffast-math"
-#endif
-#if defined(_MSC_VER)
-#pragma fp_contract(off)
-#elif defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
-#elif defined(__GNUC__) && defined(FUSES) && !defined(__STRICT_ANSI__)
-#if !defined(NAME_NOT_FUSED)
-#error "compile with -std=c99, or with -ffp-contract=off -DNAME_NOT_FUSED"
-#endif
-#endif
-"""
 
 _TYPES = """
 #ifdef __cplusplus
@@ -189,7 +144,7 @@ def write_c(
     if isinstance(model, FuzzySystem):
         if dtype != "float64":
             raise ValueError("fuzzy systems are written in float64 only")
-        parts = _system_text(
+        parts = system_text(
             model, activations=activations, tables=tables, selftest=selftest
         )
         body = "".join(parts)
@@ -222,38 +177,6 @@ def beginning(own: str, name: str | None) -> str:
     return prefix
 
 
-def _system_text(
-    system: FuzzySystem, *, activations: bool, tables: bool, selftest: bool
-) -> Iterator[str]:
-    """Yield what stands behind the heading of a system."""
-    yield _USE + _DECLARE
-    yield "typedef double name_real;\n\n"
-    count = len(system.outputs) + activations * len(system.rules)
-    yield f"#define NAME_INPUTS {len(system.inputs)}u\n"
-    yield f"#define NAME_OUTPUTS {count}u\n"
-    yield SYSTEM_TYPES + _DEFINE
-    yield _checks(DOUBLE, is_arithmetic=True)
-    yield from system_code(system, activations=activations, tables=tables)
-    if selftest:
-        yield from system_selftest(system, activations=activations)
-    yield "\n#endif\n"
-
-
-def _checks(numbers: CNumbers, *, is_arithmetic: bool) -> str:
-    """Return what refuses to compile where numbers are not those of IEEE."""
-    limits, exact = "DBL_MANT_DIG != 53 || DBL_MAX_EXP != 1024", "FLT_EVAL_METHOD == 0"
-    fuses = "__FP_FAST_FMA"
-    if numbers is SINGLE:
-        limits = "FLT_MANT_DIG != 24 || FLT_MAX_EXP != 128"
-        fuses = "__FP_FAST_FMAF"
-    else:
-        exact += " || FLT_EVAL_METHOD == 1"
-    text = _LIMITS.replace("LIMITS", limits)
-    if is_arithmetic:
-        text += _ARITHMETIC.replace("EVALUATION", exact)
-    return text.replace("KIND", numbers.name).replace("FUSES", fuses)
-
-
 class CFile(CModel):
     """A file in the making."""
 
@@ -283,7 +206,7 @@ class CFile(CModel):
     def declarations(self) -> Iterator[str]:
         """Yield the heading and what users of the file see, open at the end."""
         yield from _heading(self.model, self.source)
-        yield self._fill(_USE) + self._fill(_DECLARE)
+        yield self._fill(USE) + self._fill(DECLARE)
         yield from self._declarations()
 
     def definitions(self, *, is_arithmetic: bool) -> Iterator[str]:
@@ -291,7 +214,7 @@ class CFile(CModel):
         yield from map(self._fill, self._definitions(is_arithmetic=is_arithmetic))
 
     def _definitions(self, *, is_arithmetic: bool) -> Iterator[str]:
-        yield _DEFINE + _checks(self.numbers, is_arithmetic=is_arithmetic)
+        yield DEFINE + checks(self.numbers, is_arithmetic=is_arithmetic)
         model, semantics = self.model, self.model.semantics
         defaults = {"MISSING": semantics.missing}
         if self.tables is not None:

@@ -51,6 +51,67 @@ DOUBLE = CNumbers("double", np.float64, "")
 SINGLE = CNumbers("float", np.float32, "f")
 
 
+USE = """\
+ *
+ * Compile this file; where its functions are called, include it behind
+ * #define NAME_HEADER, which leaves the declarations. With -DNAME_SELFTEST it is a
+ * program that compares its answers with the expected ones; it returns 0 if all equal.
+ */
+
+"""
+
+DECLARE = "#ifndef NAME_DECLARED\n#define NAME_DECLARED\n\n"
+
+DEFINE = "\n#endif\n\n#ifndef NAME_HEADER\n\n"
+
+_LIMITS = """\
+#include <float.h>
+#include <stdint.h>
+
+#if FLT_RADIX != 2 || LIMITS
+#error "KIND is no IEEE number here"
+#endif
+"""
+
+_ARITHMETIC = """\
+/* Each operation must be rounded once, to KIND. */
+#if defined(FLT_EVAL_METHOD)
+#if !(EVALUATION)
+#error "numbers have other digits here: on x86 compile with -msse2 -mfpmath=sse"
+#endif
+#elif !defined(__TINYC__) || defined(__i386__)
+#error "float.h of C99 must define FLT_EVAL_METHOD"
+#endif
+#if defined(__FAST_MATH__)
+#error "compile without -ffast-math"
+#endif
+#if defined(_MSC_VER)
+#pragma fp_contract(off)
+#elif defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && defined(FUSES) && !defined(__STRICT_ANSI__)
+#if !defined(NAME_NOT_FUSED)
+#error "compile with -std=c99, or with -ffp-contract=off -DNAME_NOT_FUSED"
+#endif
+#endif
+"""
+
+
+def checks(numbers: CNumbers, *, is_arithmetic: bool) -> str:
+    """Return what refuses to compile where numbers are not those of IEEE."""
+    limits, exact = "DBL_MANT_DIG != 53 || DBL_MAX_EXP != 1024", "FLT_EVAL_METHOD == 0"
+    fuses = "__FP_FAST_FMA"
+    if numbers is SINGLE:
+        limits = "FLT_MANT_DIG != 24 || FLT_MAX_EXP != 128"
+        fuses = "__FP_FAST_FMAF"
+    else:
+        exact += " || FLT_EVAL_METHOD == 1"
+    text = _LIMITS.replace("LIMITS", limits)
+    if is_arithmetic:
+        text += _ARITHMETIC.replace("EVALUATION", exact)
+    return text.replace("KIND", numbers.name).replace("FUSES", fuses)
+
+
 def fill(template: str, prefix: str) -> str:
     """Return a template with a prefix for `name_`, and its capitals for `NAME_`."""
     capital = template.replace("NAME_", f"{prefix.upper()}_")
