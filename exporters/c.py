@@ -13,7 +13,7 @@ from typing import Literal
 
 from fuzzytree.exporters.c_rules import probability_code, rules_code
 from fuzzytree.exporters.c_selftest import number_of, selftest_code
-from fuzzytree.exporters.c_systems import system_text
+from fuzzytree.exporters.c_systems import system_file
 from fuzzytree.exporters.c_tables import CModel
 from fuzzytree.exporters.c_text import (
     DECLARE,
@@ -113,7 +113,8 @@ def write_c(
     Args:
         model: A tree, a rule base or a fuzzy system.
         allow_loss: Whether to round what float32 cannot represent.
-        dtype: The type of all numbers: double, or float. A fuzzy system needs double.
+        dtype: The type of all numbers: double, or float. Of a fuzzy system in float,
+            the file says how far each output may be from exact numbers.
         name: The beginning of all names in the file; that of the model unless given.
         activations: Of a fuzzy system: whether the degree of activation of every rule
             stands behind the outputs.
@@ -142,14 +143,12 @@ def write_c(
         check_rated(model, "c")
     prefix = beginning(model.name, name)
     if isinstance(model, FuzzySystem):
-        if dtype != "float64":
-            raise ValueError("fuzzy systems are written in float64 only")
-        parts = system_text(
-            model, activations=activations, tables=tables, selftest=selftest
+        file = system_file(
+            model, _NUMBERS[dtype], activations=activations, tables=tables
         )
-        body = "".join(parts)
+        body = "".join(file.text(selftest=selftest))
         text = "".join(_heading(model, source)) + fill(body, prefix)
-        return Written(text.encode("ascii"))
+        return Written(text.encode("ascii"), remarks=tuple(file.remarks()))
     if activations:
         raise ValueError("activations are those of fuzzy systems")
     if tables:

@@ -4,18 +4,45 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
-from fuzzytree.exporters.c_steps import CSteps
-from fuzzytree.exporters.c_text import DECLARE, DEFINE, DOUBLE, USE, bits_of, checks
+import numpy as np
+
+from fuzzytree.exporters.c_steps import LIBRARY, WORDS, CSteps
+from fuzzytree.exporters.c_text import (
+    DECLARE,
+    DEFINE,
+    DOUBLE,
+    USE,
+    CNumbers,
+    bits_of,
+    checks,
+    remark,
+)
 from fuzzytree.exporters.program_text import SystemExample, system_examples
 from fuzzytree.model import FuzzySystem
-from fuzzytree.semantics import Program, from_system, system_probes
+from fuzzytree.numerics import short_above
+from fuzzytree.semantics import (
+    Program,
+    Worst,
+    evaluate_program,
+    float32_rounding,
+    from_system,
+    spreads,
+    system_probes,
+    worst_over,
+)
 
 _ROWS = 100
 _PROBES = 400
 _FEWEST = 20
 _RULES = 20_000  # rules of all rows that are tried, together
 _SHARE = 1e-6  # of a number: its error where no bound is known
+
+_ERRORS = {
+    "double": "Errors are allowed only where a mathematical library is called.",
+    "float": "The errors are the derived bounds of each example.",
+}
 
 _TYPES = """
 #ifdef __cplusplus
@@ -39,7 +66,8 @@ int name_infer(const name_real *x, name_real *outputs);
 _MAIN = """
 static int name_is_near(name_real a, name_real b, name_real most)
 {
-    return a == b || (a != a && b != b) || (a - b <= most && b - a <= most);
+    int is_alike = a == b || (a != a && b != b) || (most != most && b == b);
+    return is_alike || (a - b <= most && b - a <= most); /* most is NaN: no bound */
 }
 
 int main(void)
@@ -81,40 +109,156 @@ int main(void)
 """
 
 
-def system_text(
-    system: FuzzySystem, *, activations: bool, tables: bool, selftest: bool
-) -> Iterator[str]:
-    """Yield what stands behind the heading of a system."""
-    yield USE + DECLARE
-    yield "typedef double name_real;\n\n"
-    count = len(system.outputs) + activations * len(system.rules)
-    yield f"#define NAME_INPUTS {len(system.inputs)}u\n"
-    yield f"#define NAME_OUTPUTS {count}u\n"
-    yield _TYPES + DEFINE
-    yield checks(DOUBLE, is_arithmetic=True)
-    yield from _code(system, activations=activations, tables=tables)
-    if selftest:
-        yield from _selftest(system, activations=activations)
-    yield "\n#endif\n"
+class SystemFile(NamedTuple):
+    """A system on its way to C: its program, its numbers, and how far these are off.
+
+    Attributes:
+        system: The system.
+        program: Its program.
+        steps: The program's statements.
+        numbers: The type of all numbers.
+        worst: The worst errors over all inputs in their ranges; None of doubles, which
+            are what others are compared with, and where an input has no range.
+    """
+
+    system: FuzzySystem
+    program: Program
+    steps: CSteps
+    numbers: CNumbers
+    worst: Worst | None
+
+    def text(self, *, selftest: bool) -> Iterator[str]:
+        """Yield what stands behind the heading."""
+        for line in self.remarks():
+            yield f" * {remark(line)}\n"
+        yield USE + DECLARE
+        yield f"typedef {self.numbers.name} name_real;\n\n"
+        yield f"#define NAME_INPUTS {len(self.system.inputs)}u\n"
+        yield f"#define NAME_OUTPUTS {len(self.program.results) - 1}u\n"
+        yield _TYPES + DEFINE
+        yield checks(self.numbers, is_arithmetic=True)
+        yield from self._function()
+        if selftest:
+            yield from self._selftest()
+        yield "\n#endif\n"
+
+    def remarks(self) -> Iterator[str]:
+        """Yield how far each output may be from exact numbers, of all but doubles."""
+        if self.numbers is DOUBLE:
+            return
+        if self.worst is None:
+            yield "nothing is known of errors: an input has no range"
+            return
+        ends = zip(self.program.results, *self.worst[:2], strict=True)
+        for result, error, share in ends:
+            if share == 1.0 and result.kind != "status":
+                yield f"{result.title}: no bound of its error is known"
+            elif result.kind != "status":
+                text = f"{result.title} is within {short_above(error)} of exact numbers"
+                where = (
+                    f", but for {short_above(share)} of these, where a choice is open"
+                )
+                yield f"{text} for inputs in their ranges{where if share else ''}"
+
+    def _function(self) -> Iterator[str]:
+        ends = list(_ends(self.program, self.steps))
+        if self.steps.needs_library:
+            yield "#include <math.h>\n"
+        yield "\n"
+        yield from self.steps.function_text()
+        yield "\nint name_infer(const name_real *x, name_real *outputs)\n{\n"
+        loops = "".join(line for line in self.steps.body if "for (" in line)
+        if loops:
+            yield f"    name_place i{', k' * ('k++' in loops)};\n"
+        if not self.program.inputs:
+            yield "    (void)x;\n"
+        yield from (*self.steps.body, *ends)
+        yield "}\n"
+
+    def _selftest(self) -> Iterator[str]:
+        """Yield the self-test, behind a macro.
+
+        Outputs must be equal, or as near as functions of different libraries allow, or
+        as numbers of this type are to exact ones.
+        """
+        examples = list(self._examples())
+        yield "\n#ifdef NAME_SELFTEST\n"
+        if not examples:
+            yield '#error "no example of this model has a known error"\n#endif\n'
+            return
+        inputs, outputs = max(len(self.system.inputs), 1), len(self.program.results) - 1
+        bits = WORDS[self.numbers.name]["UINT"]
+        yield "#include <stdio.h>\n\n"
+        yield "/* Bits of inputs, outputs and their largest errors; the status.\n"
+        yield f" * {_ERRORS[self.numbers.name]} */\n"
+        yield "static const struct {\n"
+        yield f"    {bits} x[{inputs}];\n    {bits} outputs[{outputs}];\n"
+        yield f"    {bits} most[{outputs}];\n    int status;\n"
+        yield f"}} name_example[{len(examples)}] = {{\n"
+        for operands, result, bound, status in examples:
+            shown = ", ".join(map(repr, operands)) or "no inputs"
+            yield f"    /* {shown}: {', '.join(map(repr, result))} */\n"
+            rows = (operands, result, bound)
+            parts = ", ".join(bits_of(row, self.numbers) for row in rows)
+            yield f"    {{{parts}, {status}}},\n"
+        yield "};\n"
+        yield _MAIN.replace("uint64_t", bits)
+
+    def _examples(self) -> Iterator[SystemExample]:
+        """Yield examples of this type, with the errors that are allowed."""
+        has_activations = bool(self.program.of("activation"))
+        examples = _examples(self.system, activations=has_activations)
+        if self.numbers is DOUBLE:
+            yield from examples
+            return
+        for operands, _, _, _ in examples:
+            with np.errstate(over="ignore"):
+                row = np.array(operands, np.float32).astype(np.float64).tolist()
+            numbers = evaluate_program(
+                self.program, dict(zip(self.program.inputs, row, strict=True))
+            )
+            values = np.array(row).reshape(-1, 1)
+            every = spreads(
+                self.program, values, values, float32_rounding(self.program)
+            )
+            *bounds, unsure = (
+                float(every[r.step].error.max()) for r in self.program.results
+            )
+            *outputs, status = numbers.values
+            if not unsure:
+                unit = 2.0**-23  # what is expected is rounded too
+                most = [
+                    math.nan if math.isinf(bound) else bound + unit * abs(value)
+                    for bound, value in zip(bounds, outputs, strict=True)
+                ]
+                yield row, tuple(outputs), most, int(status)
 
 
-def _code(system: FuzzySystem, *, activations: bool, tables: bool) -> Iterator[str]:
-    """Yield the tables, helpers and the function of a system."""
+def system_file(
+    system: FuzzySystem, numbers: CNumbers, *, activations: bool, tables: bool
+) -> SystemFile:
+    """Return the file of a system in numbers of a type.
+
+    Raises:
+        ValueError: If a number of the system is beyond the type.
+    """
     program = from_system(system, activations=activations)
-    steps = CSteps(program, tables=tables)
-    ends = list(_ends(program, steps))
-    if steps.needs_library:
-        yield "#include <math.h>\n"
-    yield "\n"
-    yield from steps.function_text()
-    yield "\nint name_infer(const name_real *x, name_real *outputs)\n{\n"
-    loops = "".join(line for line in steps.body if "for (" in line)
-    if loops:
-        yield f"    name_place i{', k' * ('k++' in loops)};\n"
-    if not program.inputs:
-        yield "    (void)x;\n"
-    yield from (*steps.body, *ends)
-    yield "}\n"
+    library, worst = LIBRARY, None
+    if numbers is not DOUBLE:
+        library = {name: f"{function}f" for name, function in LIBRARY.items()}
+        for step, title in zip(program.steps, program.titles, strict=True):
+            size = max(map(abs, (step.number, *step.table)))
+            if numbers.largest < size < math.inf:
+                raise ValueError(
+                    f"c float32: {size!r} {f'of {title} ' * bool(title)}is beyond "
+                    f"{numbers.name}, whose largest number is {numbers.largest:.2g}"
+                )
+        ranges = [(one.low, one.high) for one in system.variables]
+        if all(None not in ends for ends in ranges):
+            known = [(low or 0.0, high or 0.0) for low, high in ranges]
+            worst = worst_over(program, known, float32_rounding(program))
+    steps = CSteps(program, numbers, library, tables=tables)
+    return SystemFile(system, program, steps, numbers, worst)
 
 
 def _ends(program: Program, steps: CSteps) -> Iterator[str]:
@@ -123,29 +267,6 @@ def _ends(program: Program, steps: CSteps) -> Iterator[str]:
         yield f"    outputs[{line}] = {steps.value(place)};\n"
     (status,) = program.of("status")
     yield f"    return (int)({steps.value(status)});\n"
-
-
-def _selftest(system: FuzzySystem, *, activations: bool) -> Iterator[str]:
-    """Yield the self-test of a system, behind a macro.
-
-    Outputs must be equal, or as near as functions of different libraries allow.
-    """
-    examples = _examples(system, activations=activations)
-    inputs, outputs = max(len(system.inputs), 1), len(examples[0][1])
-    yield "\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n"
-    yield "\n/* Bits of the inputs, the outputs and their largest errors; the status.\n"
-    yield " * Errors are allowed only where a mathematical library is called. */\n"
-    yield "static const struct {\n"
-    yield f"    uint64_t x[{inputs}];\n    uint64_t outputs[{outputs}];\n"
-    yield f"    uint64_t most[{outputs}];\n    int status;\n"
-    yield f"}} name_example[{len(examples)}] = {{\n"
-    for operands, result, bound, status in examples:
-        shown = ", ".join(map(repr, operands)) or "no inputs"
-        yield f"    /* {shown}: {', '.join(map(repr, result))} */\n"
-        parts = ", ".join(map(bits_of, (operands, result, bound)))
-        yield f"    {{{parts}, {status}}},\n"
-    yield "};\n"
-    yield _MAIN
 
 
 def _examples(system: FuzzySystem, *, activations: bool) -> list[SystemExample]:

@@ -68,16 +68,17 @@ extern void model_many(const model_real *x, size_t rows, int64_t *rule,
 _INFER_LOOP = """
 #include <stddef.h>
 
-extern void model_many(const double *x, size_t rows, double *outputs, int64_t *status)
+extern void model_many(const model_real *x, size_t rows, double *outputs,
+    int64_t *status)
 {
-    double row[MODEL_INPUTS + 1], found[MODEL_OUTPUTS];
+    model_real row[MODEL_INPUTS + 1], found[MODEL_OUTPUTS];
     size_t place, line;
     for (place = 0; place < rows; place++) {
         for (line = 0; line < MODEL_INPUTS; line++)
             row[line] = x[line * rows + place];
         status[place] = model_infer(row, found);
         for (line = 0; line < MODEL_OUTPUTS; line++)
-            outputs[line * rows + place] = found[line];
+            outputs[line * rows + place] = (double)found[line];
     }
 }
 """
@@ -104,7 +105,7 @@ def load(
         FuzzyTreeError: If the compiler fails.
     """
     if isinstance(model, FuzzySystem):
-        return _load_system(model, with_strengths=with_strengths)
+        return _load_system(model, dtype, with_strengths=with_strengths)
     try:
         written = write_c(model, dtype=dtype, name="model", selftest=False)
     except LossError as error:
@@ -161,15 +162,20 @@ def load_best_first(model: Model, *, with_strengths: bool = False) -> Run:
     return load(rules, with_strengths=False)
 
 
-def _load_system(system: FuzzySystem, *, with_strengths: bool) -> Run:
+def _load_system(system: FuzzySystem, dtype: Dtype, *, with_strengths: bool) -> Run:
     """Return a function that answers rows of a fuzzy system by compiled C."""
-    file = write_c(system, name="model", activations=with_strengths, selftest=False)
-    return load_system_content(file.content, system, with_strengths=with_strengths)
+    file = write_c(
+        system, dtype=dtype, name="model", activations=with_strengths, selftest=False
+    )
+    return load_system_content(
+        file.content, system, dtype, with_strengths=with_strengths
+    )
 
 
 def load_system_content(
     content: bytes,
     system: FuzzySystem,
+    dtype: Dtype = "float64",
     *,
     prefix: str = "model",
     with_strengths: bool = True,
@@ -190,7 +196,7 @@ def load_system_content(
     count = len(system.outputs) + with_strengths * len(system.rules)
 
     def run(values: FloatArray) -> Outcome:
-        inputs = np.ascontiguousarray(checked(values, system.inputs))
+        inputs = np.ascontiguousarray(checked(values, system.inputs), dtype)
         rows = inputs.shape[1]
         numbers, status = np.empty((count, rows)), np.empty(rows, np.int64)
         infer(_at(inputs), rows, _at(numbers), _at(status))

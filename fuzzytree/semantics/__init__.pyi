@@ -70,6 +70,12 @@ from .programs.operations import OPERATIONS as OPERATIONS
 from .programs.operations import OVER_SAMPLES as OVER_SAMPLES
 from .programs.rule_program import from_axes as from_axes
 from .programs.rule_program import from_rules as from_rules
+from .programs.spreads import Rounding as Rounding
+from .programs.spreads import Spread as Spread
+from .programs.spreads import Worst as Worst
+from .programs.spreads import float32_rounding as float32_rounding
+from .programs.spreads import spreads as spreads
+from .programs.spreads import worst_over as worst_over
 from .programs.steps import Maker as Maker
 from .programs.steps import Place as Place
 from .programs.steps import Program as Program

@@ -179,8 +179,6 @@ def test_wrong_options_are_named() -> None:
         write_c(tree, dtype="mixed")  # type: ignore[arg-type] # that is the test
     with pytest.raises(ValueError, match="'Grip' cannot begin the names of C; 'grip'"):
         write_c(tree, name="Grip")
-    with pytest.raises(ValueError, match="in float64 only"):
-        write_c(random_system(0), dtype="float32")
     with pytest.raises(ValueError, match="activations are those of fuzzy systems"):
         write_c(tree, activations=True)
 

@@ -132,8 +132,8 @@ def test_every_model_compiles_without_a_warning_and_tests_itself(
 ) -> None:
     program(compiler)
     for name, model in MODELS.items():
-        if name.startswith("system") and dtype == "float32":
-            continue
+        if re.match(r"system \d", name) and dtype == "float32":
+            continue  # few of their examples have a bound
         source = tmp_path / "model.c"
         try:
             source.write_bytes(write_c(model, dtype=dtype, name="m").content)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import subprocess
 from collections.abc import Callable
@@ -9,15 +10,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
+import fuzzytree as ft
 from fuzzytree.exporters.c import write_c
 from fuzzytree.formats import read_fll
-from fuzzytree.model import FuzzySystem
+from fuzzytree.model import FloatArray, FuzzySystem
+from fuzzytree.runtimes.c import load
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics import error_bounds, from_system, infer, system_probes
 from fuzzytree.testing import random_system
 
 Need = Callable[[str], str]
+TIPPER = Path(__file__).parents[2] / "examples" / "tipper.fll"
 FAN = """\
 Engine: fan
 InputVariable: temperature
@@ -124,3 +129,46 @@ def test_a_controller_of_nine_rules_is_small(
     flash, stack = size_of(tmp_path, write_c(fan(), selftest=False).content, machine)
     assert 1000 < flash <= 2500
     assert 100 < stack <= 300
+
+
+def points(system: FuzzySystem, count: int = 100_000) -> FloatArray:
+    """Return all corners of the ranges and random rows, of shape (inputs, rows)."""
+    ends = [(one.low or 0.0, one.high or 0.0) for one in system.variables]
+    corners = np.array(list(itertools.product(*ends))).T
+    low, high = (np.array(end).reshape(-1, 1) for end in zip(*ends, strict=True))
+    rows = np.random.default_rng(5).uniform(low, high, (len(ends), count))
+    return np.hstack([corners, rows])
+
+
+def stated_bounds(content: bytes) -> list[float]:
+    """Return the bounds of errors that the comment of a file states."""
+    found = re.findall(rb" \* \w+ is within (\S+) of exact numbers for inputs", content)
+    return [float(text) for text in found]
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", ["fan", "tipper"])
+def test_float32_is_within_the_stated_bound(program: Need, name: str) -> None:
+    program("gcc")
+    system = {"fan": fan(), "tipper": ft.load(TIPPER)}[name]
+    assert isinstance(system, FuzzySystem)
+    values = np.asarray(points(system), np.float32).astype(np.float64)
+    bounds = stated_bounds(write_c(system, dtype="float32", selftest=False).content)
+    outcome = load(system, "float32", with_strengths=False)(values)
+    expected = find_runtime("native").load(system)(values)
+    assert outcome.outputs is not None
+    assert expected.outputs is not None
+    np.testing.assert_array_equal(outcome.status, expected.status)
+    worst = np.abs(outcome.outputs - expected.outputs).max(axis=1)
+    assert (worst <= bounds).all()
+    assert (worst > np.array(bounds) / 1000).all()  # and the bound says something
+
+
+def test_float32_says_where_it_knows_no_bound() -> None:
+    written = write_c(fan("MeanOfMaximum 100"), dtype="float32", selftest=False)
+    assert written.remarks == ("speed: no bound of its error is known",)
+    system = fan()
+    first = replace(system.variables[0], low=None)
+    open_ended = replace(system, variables=(first, *system.variables[1:]))
+    written = write_c(open_ended, dtype="float32", selftest=False)
+    assert written.remarks == ("nothing is known of errors: an input has no range",)

@@ -172,10 +172,10 @@ def _text(
     types = _TYPES.replace("ROWSu", f"{sensor.rows}u").replace("CELL ", f"{kind} ")
     yield fill(types.replace("COLUMNSu", f"{sensor.columns}u"), prefix)
     yield from file.definitions(is_arithmetic=True)
-    steps = CSteps(made.program, _LIBRARY)
+    steps = CSteps(made.program, library=_LIBRARY)
     ends = [*_features(made, steps)]
     yield "\n#include <math.h>\n" if steps.needs_library else ""
-    parts: list[Iterable[str]] = [steps.helper_text(), _cells(sensor), _sums(made)]
+    parts: list[Iterable[str]] = [steps.function_text(), _cells(sensor), _sums(made)]
     parts += [ends, [_recognise(reject)], _selftest(made, model, reject)]
     yield from (fill(text, prefix) for part in parts for text in part)
     yield "\n#endif\n"
