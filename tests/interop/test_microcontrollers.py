@@ -7,6 +7,7 @@ import re
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -22,7 +23,8 @@ from fuzzytree.semantics import error_bounds, from_system, infer, system_probes
 from fuzzytree.testing import random_system
 
 Need = Callable[[str], str]
-TIPPER = Path(__file__).parents[2] / "examples" / "tipper.fll"
+FOLDER = Path(__file__).parent
+TIPPER = FOLDER.parents[1] / "examples" / "tipper.fll"
 FAN = """\
 Engine: fan
 InputVariable: temperature
@@ -56,11 +58,11 @@ METHODS = (
     "SmallestOfMaximum 100",
     "LargestOfMaximum 33",
 )
-CORTEX = "arm-none-eabi-gcc -mthumb -std=c99 -Os -fstack-usage -c"
+CORTEX = "arm-none-eabi-gcc -mthumb -std=c99 -Os"
 MACHINES = {
     "Cortex-M4": f"{CORTEX} -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16",
     "Cortex-M0": f"{CORTEX} -mcpu=cortex-m0",
-    "ATmega328P": "avr-gcc -mmcu=atmega328p -std=c99 -Os -fstack-usage -c",
+    "ATmega328P": "avr-gcc -mmcu=atmega328p -std=c99 -Os",
 }
 
 
@@ -81,7 +83,8 @@ def size_of(folder: Path, content: bytes, machine: str) -> tuple[int, int]:
     """Return the bytes of code and constants, and of the stack, without libraries."""
     source, target = folder / "model.c", folder / "model.o"
     source.write_bytes(content)
-    words = [*MACHINES[machine].split(), str(source), "-o", str(target)]
+    words = [*MACHINES[machine].split(), "-fstack-usage", "-c", str(source)]
+    words += ["-o", str(target)]
     subprocess.run(words, check=True)
     size = words[0].replace("-gcc", "-size")
     done = subprocess.run([size, target], capture_output=True, text=True, check=True)
@@ -172,3 +175,74 @@ def test_float32_says_where_it_knows_no_bound() -> None:
     open_ended = replace(system, variables=(first, *system.variables[1:]))
     written = write_c(open_ended, dtype="float32", selftest=False)
     assert written.remarks == ("nothing is known of errors: an input has no range",)
+
+
+def answer_of(folder: Path, words: list[str], run: list[str]) -> str:
+    """Return what the self-test says, built for a machine and run by a simulator."""
+    target = folder / "model.elf"
+    subprocess.run([*words, "-o", str(target), "-lm"], check=True)
+    done = subprocess.run(
+        [*run, str(target)], capture_output=True, text=True, check=False, timeout=60
+    )
+    return done.stdout + done.stderr
+
+
+def all_right(answer: str) -> bool:
+    """Return whether a self-test met all examples, and has some."""
+    counts = re.search(r"(\d+) of (\d+) examples answered as expected", answer)
+    return counts is not None and counts[1] == counts[2] and int(counts[1]) > 20
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("machine", ["Cortex-M4", "Cortex-M0"])
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_the_self_test_holds_on_a_cortex(
+    tmp_path: Path, program: Need, machine: str, dtype: Literal["float64", "float32"]
+) -> None:
+    program("arm-none-eabi-gcc")
+    source = tmp_path / "model.c"
+    build = [*MACHINES[machine].split(), "-DFAN_SELFTEST"]
+    build += ["--specs=rdimon.specs", "-Wl,--section-start=.vectors=0"]
+    simulator = [program("qemu-system-arm"), "-M", "mps2-an386"]  # runs code of both
+    simulator += ["-nographic", "-semihosting", "-kernel"]
+    start = FOLDER / "cortex_start.c"
+    text = write_c(fan(), dtype=dtype).content.decode()
+    source.write_text(text)
+    answer = answer_of(tmp_path, [*build, str(source), str(start)], simulator)
+    assert all_right(answer), answer
+    changed = text.replace("0x1.4p+4", "0x1.5p+4")
+    assert changed != text
+    source.write_text(changed)
+    answer = answer_of(tmp_path, [*build, str(source), str(start)], simulator)
+    assert "instead of" in answer
+
+
+@pytest.mark.heavy
+def test_the_self_test_holds_on_an_avr(tmp_path: Path, program: Need) -> None:
+    program("avr-gcc")
+    source, machine = (
+        tmp_path / "model.c",
+        "atmega1284p",
+    )  # an ATmega328P, with more RAM
+    source.write_bytes(write_c(fan(), dtype="float32").content)
+    build = ["avr-gcc", f"-mmcu={machine}", "-std=gnu99", "-ffp-contract=off", "-Os"]
+    build += ["-DFAN_NOT_FUSED", "-DFAN_SELFTEST", str(source)]
+    simulator = [program("simavr"), "-m", machine, "-f", "16000000"]
+    words = [*build, str(FOLDER / "avr_start.c")]
+    answer = answer_of(tmp_path, words, simulator)
+    assert all_right(answer), answer
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize(
+    ("machine", "most"),
+    [("Cortex-M4", 1400), ("Cortex-M0", 1400), ("ATmega328P", 3300)],
+)
+def test_a_controller_in_float32_is_small(
+    tmp_path: Path, program: Need, machine: str, most: int
+) -> None:
+    program(MACHINES[machine].split()[0])
+    content = write_c(fan(), dtype="float32", selftest=False).content
+    flash, stack = size_of(tmp_path, content, machine)
+    assert 1000 < flash <= most
+    assert 50 < stack <= 150
