@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
+from fuzzytree.exporters.c_fixed import Q15, Q31
 from fuzzytree.exporters.c_rules import probability_code, rules_code
 from fuzzytree.exporters.c_selftest import number_of, selftest_code
 from fuzzytree.exporters.c_systems import system_file
@@ -53,7 +54,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.numerics import losses
 
-_NUMBERS = {"float64": DOUBLE, "float32": SINGLE}
+_NUMBERS = {"float64": DOUBLE, "float32": SINGLE, "q15": Q15, "q31": Q31}
 
 _TYPES = """
 #ifdef __cplusplus
@@ -97,7 +98,7 @@ def write_c(
     /,
     *,
     allow_loss: bool = False,
-    dtype: Literal["float64", "float32"] = "float64",
+    dtype: Literal["float64", "float32", "q15", "q31"] = "float64",
     name: str | None = None,
     activations: bool = False,
     probabilities: bool = False,
@@ -138,7 +139,7 @@ def write_c(
     """
     source = source_of(write_c, model, locals())
     if dtype not in _NUMBERS:
-        raise ValueError(f"C has float64 and float32, not {dtype!r}")
+        raise ValueError(f"C has {', '.join(_NUMBERS)}, not {dtype!r}")
     if probabilities:
         check_rated(model, "c")
     prefix = beginning(model.name, name)
@@ -153,6 +154,8 @@ def write_c(
         raise ValueError("activations are those of fuzzy systems")
     if tables:
         raise ValueError("tables are those of fuzzy systems")
+    if dtype not in ("float64", "float32"):
+        raise ValueError("fixed point is for fuzzy systems; trees and rules are floats")
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, "c float32", lost)

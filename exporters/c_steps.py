@@ -250,7 +250,7 @@ class CSteps(StepText):
             yield "};\n"
         for name, text in HELPERS.items():
             if name in self.needs and name not in self.library:
-                for mark, word in WORDS[self.numbers.name].items():
+                for mark, word in WORDS.get(self.numbers.name, {}).items():
                     text = text.replace(mark, word)
                 yield text
         yield from functions

@@ -8,11 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fuzzytree.exporters.c_steps import LIBRARY, WORDS, CSteps
+from fuzzytree.exporters.c_fixed import FixedNumbers, FixedSteps
+from fuzzytree.exporters.c_steps import LIBRARY, CSteps
 from fuzzytree.exporters.c_text import (
     DECLARE,
     DEFINE,
     DOUBLE,
+    SINGLE,
     USE,
     CNumbers,
     bits_of,
@@ -42,6 +44,8 @@ _SHARE = 1e-6  # of a number: its error where no bound is known
 _ERRORS = {
     "double": "Errors are allowed only where a mathematical library is called.",
     "float": "The errors are the derived bounds of each example.",
+    "int16_t": "The errors are the derived bounds.",
+    "int32_t": "The errors are the derived bounds.",
 }
 
 _TYPES = """
@@ -66,8 +70,8 @@ int name_infer(const name_real *x, name_real *outputs);
 _MAIN = """
 static int name_is_near(name_real a, name_real b, name_real most)
 {
-    int is_alike = a == b || (a != a && b != b) || (most != most && b == b);
-    return is_alike || (a - b <= most && b - a <= most); /* most is NaN: no bound */
+    int is_alike = NONE || a == b; /* most is NaN: no bound */
+    return is_alike || (a - b <= most && b - a <= most);
 }
 
 int main(void)
@@ -98,7 +102,7 @@ int main(void)
             printf("example %u: status %d instead of %d; outputs and expected ones:",
                 place, status, name_example[place].status);
             for (line = 0; line < NAME_OUTPUTS; line++)
-                printf(" %.17g %.17g", outputs[line], expected[line]);
+                printf(" %.17g %.17g", (double)outputs[line], (double)expected[line]);
             printf("\\n");
         }
     }
@@ -132,11 +136,16 @@ class SystemFile(NamedTuple):
         for line in self.remarks():
             yield f" * {remark(line)}\n"
         yield USE + DECLARE
+        if isinstance(self.numbers, FixedNumbers):
+            yield "#include <stdint.h>\n\n"
         yield f"typedef {self.numbers.name} name_real;\n\n"
         yield f"#define NAME_INPUTS {len(self.system.inputs)}u\n"
         yield f"#define NAME_OUTPUTS {len(self.program.results) - 1}u\n"
         yield _TYPES + DEFINE
-        yield checks(self.numbers, is_arithmetic=True)
+        if isinstance(self.numbers, FixedNumbers):
+            yield f"typedef {self.numbers.wide} name_wide;\n"
+        else:
+            yield checks(self.numbers, is_arithmetic=True)
         yield from self._function()
         if selftest:
             yield from self._selftest()
@@ -146,6 +155,8 @@ class SystemFile(NamedTuple):
         """Yield how far each output may be from exact numbers, of all but doubles."""
         if self.numbers is DOUBLE:
             return
+        if isinstance(self.steps, FixedSteps):
+            yield from self.steps.scales()
         if self.worst is None:
             yield "nothing is known of errors: an input has no range"
             return
@@ -187,7 +198,7 @@ class SystemFile(NamedTuple):
             yield '#error "no example of this model has a known error"\n#endif\n'
             return
         inputs, outputs = max(len(self.system.inputs), 1), len(self.program.results) - 1
-        bits = WORDS[self.numbers.name]["UINT"]
+        bits = f"uint{8 * np.dtype(self.numbers.kind).itemsize}_t"
         yield "#include <stdio.h>\n\n"
         yield "/* Bits of inputs, outputs and their largest errors; the status.\n"
         yield f" * {_ERRORS[self.numbers.name]} */\n"
@@ -202,7 +213,11 @@ class SystemFile(NamedTuple):
             parts = ", ".join(bits_of(row, self.numbers) for row in rows)
             yield f"    {{{parts}, {status}}},\n"
         yield "};\n"
-        yield _MAIN.replace("uint64_t", bits)
+        is_fixed = isinstance(self.steps, FixedSteps)
+        none = "(a != a && b != b) || (most != most && b == b)"
+        yield _MAIN.replace("uint64_t", bits).replace(
+            "NONE || ", "" if is_fixed else f"{none} || "
+        )
 
     def _examples(self) -> Iterator[SystemExample]:
         """Yield examples of this type, with the errors that are allowed."""
@@ -210,6 +225,9 @@ class SystemFile(NamedTuple):
         examples = _examples(self.system, activations=has_activations)
         if self.numbers is DOUBLE:
             yield from examples
+            return
+        if isinstance(self.steps, FixedSteps):
+            yield from self.steps.examples([operands for operands, *_ in examples])
             return
         for operands, _, _, _ in examples:
             with np.errstate(over="ignore"):
@@ -244,7 +262,7 @@ def system_file(
     """
     program = from_system(system, activations=activations)
     library, worst = LIBRARY, None
-    if numbers is not DOUBLE:
+    if numbers is SINGLE:
         library = {name: f"{function}f" for name, function in LIBRARY.items()}
         for step, title in zip(program.steps, program.titles, strict=True):
             size = max(map(abs, (step.number, *step.table)))
@@ -253,10 +271,22 @@ def system_file(
                     f"c float32: {size!r} {f'of {title} ' * bool(title)}is beyond "
                     f"{numbers.name}, whose largest number is {numbers.largest:.2g}"
                 )
-        ranges = [(one.low, one.high) for one in system.variables]
-        if all(None not in ends for ends in ranges):
-            known = [(low or 0.0, high or 0.0) for low, high in ranges]
-            worst = worst_over(program, known, float32_rounding(program))
+    ranges = [
+        (one.low, one.high)
+        for one in system.variables
+        if one.low is not None and one.high is not None
+    ]
+    has_ranges = len(ranges) == len(system.variables)
+    if isinstance(numbers, FixedNumbers):
+        if not has_ranges:
+            names = [
+                one.name for one in system.variables if None in (one.low, one.high)
+            ]
+            raise ValueError(f"fixed point needs the range of {names[0]!r}; add it")
+        fixed = FixedSteps(program, ranges, numbers, tables=tables)
+        return SystemFile(system, fixed.program, fixed, numbers, fixed.worst)
+    if numbers is not DOUBLE and has_ranges:
+        worst = worst_over(program, ranges, float32_rounding(program))
     steps = CSteps(program, numbers, library, tables=tables)
     return SystemFile(system, program, steps, numbers, worst)
 

@@ -161,7 +161,8 @@ def bits_of(values: Sequence[float], numbers: CNumbers = DOUBLE) -> str:
     """Return the bits of some numbers as constants; all NaN are one."""
     size = np.dtype(numbers.kind).itemsize
     array = np.array(values, numbers.kind)
-    array[np.isnan(array)] = np.nan
+    if np.isnan(array).any():
+        array[np.isnan(array)] = np.nan
     bits = array.view(f"u{size}").tolist()
     words = [f"UINT{8 * size}_C({one:#0{2 * size + 2}x})" for one in bits]
     return f"{{{', '.join(words) or '0'}}}"

@@ -175,7 +175,7 @@ def test_what_float_cannot_hold_is_refused_with_every_loss() -> None:
 
 def test_wrong_options_are_named() -> None:
     tree = random_tree(0)
-    with pytest.raises(ValueError, match="float64 and float32, not 'mixed'"):
+    with pytest.raises(ValueError, match="float64, float32, q15, q31, not 'mixed'"):
         write_c(tree, dtype="mixed")  # type: ignore[arg-type] # that is the test
     with pytest.raises(ValueError, match="'Grip' cannot begin the names of C; 'grip'"):
         write_c(tree, name="Grip")

@@ -17,12 +17,13 @@ import fuzzytree as ft
 from fuzzytree.exporters.c import write_c
 from fuzzytree.formats import read_fll
 from fuzzytree.model import FloatArray, FuzzySystem
-from fuzzytree.runtimes.c import load
+from fuzzytree.runtimes.c import compiled, load
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics import error_bounds, from_system, infer, system_probes
 from fuzzytree.testing import random_system
 
 Need = Callable[[str], str]
+Dtype = Literal["float64", "float32", "q15", "q31"]
 FOLDER = Path(__file__).parent
 TIPPER = FOLDER.parents[1] / "examples" / "tipper.fll"
 FAN = """\
@@ -195,9 +196,9 @@ def all_right(answer: str) -> bool:
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("machine", ["Cortex-M4", "Cortex-M0"])
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize("dtype", ["float64", "float32", "q15", "q31"])
 def test_the_self_test_holds_on_a_cortex(
-    tmp_path: Path, program: Need, machine: str, dtype: Literal["float64", "float32"]
+    tmp_path: Path, program: Need, machine: str, dtype: Dtype
 ) -> None:
     program("arm-none-eabi-gcc")
     source = tmp_path / "model.c"
@@ -210,7 +211,7 @@ def test_the_self_test_holds_on_a_cortex(
     source.write_text(text)
     answer = answer_of(tmp_path, [*build, str(source), str(start)], simulator)
     assert all_right(answer), answer
-    changed = text.replace("0x1.4p+4", "0x1.5p+4")
+    changed = re.sub(r" / (v106|0x1\.4p\+4)", r" * 3 / \1", text)
     assert changed != text
     source.write_text(changed)
     answer = answer_of(tmp_path, [*build, str(source), str(start)], simulator)
@@ -218,19 +219,105 @@ def test_the_self_test_holds_on_a_cortex(
 
 
 @pytest.mark.heavy
-def test_the_self_test_holds_on_an_avr(tmp_path: Path, program: Need) -> None:
+@pytest.mark.parametrize("dtype", ["float32", "q15"])
+def test_the_self_test_holds_on_an_avr(
+    tmp_path: Path, program: Need, dtype: Dtype
+) -> None:
     program("avr-gcc")
     source, machine = (
         tmp_path / "model.c",
         "atmega1284p",
     )  # an ATmega328P, with more RAM
-    source.write_bytes(write_c(fan(), dtype="float32").content)
+    source.write_bytes(write_c(fan(), dtype=dtype).content)
     build = ["avr-gcc", f"-mmcu={machine}", "-std=gnu99", "-ffp-contract=off", "-Os"]
     build += ["-DFAN_NOT_FUSED", "-DFAN_SELFTEST", str(source)]
     simulator = [program("simavr"), "-m", machine, "-f", "16000000"]
     words = [*build, str(FOLDER / "avr_start.c")]
     answer = answer_of(tmp_path, words, simulator)
     assert all_right(answer), answer
+
+
+FIXED_LOOP = """
+extern void fan_many(const fan_real *x, size_t rows, fan_real *outputs)
+{
+    size_t place;
+    for (place = 0; place < rows; place++)
+        if (fan_infer(x + FAN_INPUTS * place, outputs + FAN_OUTPUTS * place))
+            outputs[FAN_OUTPUTS * place] = -1;
+}
+"""
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("method", ["Centroid 100", "Centroid 37"])
+@pytest.mark.parametrize("dtype", ["q15", "q31"])
+def test_fixed_point_is_within_the_stated_bound(
+    program: Need, dtype: Literal["q15", "q31"], method: str
+) -> None:
+    program("gcc")
+    system = fan(method)
+    content = write_c(system, dtype=dtype, selftest=False).content
+    assert not re.search(rb"float|double|math\.h", content.partition(b"*/")[2])
+    bits = [int(text) for text in re.findall(rb"is \w+ times 2\^(\d+)", content)]
+    kind = np.int16 if dtype == "q15" else np.int32
+    values = points(system) * 2.0 ** np.array(bits[:2]).reshape(-1, 1)
+    x = np.ascontiguousarray(np.trunc(values).T, kind)
+    outputs = np.empty(len(x), kind)
+    run = compiled(content, "#include <stddef.h>" + FIXED_LOOP, 1, function="fan_many")
+    run(x.ctypes.data, len(x), outputs.ctypes.data)
+    inputs = x.T.astype(np.float64) / 2.0 ** np.array(bits[:2]).reshape(-1, 1)
+    expected = find_runtime("native").load(system)(inputs)
+    assert expected.outputs is not None
+    numbers = outputs.astype(np.float64) / 2.0 ** bits[2]
+    worst = np.abs(numbers - expected.outputs[0]).max()
+    (bound,) = stated_bounds(content)
+    assert bound / 1000 < worst <= bound
+    assert bound < (1.5 if dtype == "q15" else 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (("Centroid 100", "MeanOfMaximum 100"), "fixed point has no highest, which"),
+        (
+            ("mild Triangle 8.0 20.0 31.0", "mild Gaussian 20 5"),
+            "no exponential, which",
+        ),
+        (("cold Triangle -1.0 5.0 20.0", "cold Triangle -1 5 7"), "has no range"),
+    ],
+)
+def test_what_fixed_point_cannot_do_is_refused(
+    change: tuple[str, str], text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(globals(), "FAN", FAN.replace(*change))
+    with pytest.raises(ValueError, match=text) as refusal:
+        write_c(fan(change[1] if "Maximum" in change[1] else METHODS[0]), dtype="q15")
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize(
+    ("dtype", "machine", "flash", "stack"),
+    [
+        ("q15", "Cortex-M4", 1200, 100),
+        ("q15", "Cortex-M0", 1300, 100),
+        ("q15", "ATmega328P", 2500, 100),
+        ("q31", "Cortex-M4", 1100, 150),
+    ],
+)
+def test_a_controller_in_fixed_point_is_small(
+    tmp_path: Path,
+    program: Need,
+    dtype: Literal["q15", "q31"],
+    machine: str,
+    flash: int,
+    stack: int,
+) -> None:
+    program(MACHINES[machine].split()[0])
+    content = write_c(fan(), dtype=dtype, selftest=False).content
+    code, depth = size_of(tmp_path, content, machine)
+    assert 800 < code <= flash
+    assert 30 < depth <= stack
 
 
 @pytest.mark.heavy

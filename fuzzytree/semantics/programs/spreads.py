@@ -12,6 +12,7 @@ answers count. A quotient has no bound where its divisor may be 0.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -373,7 +374,8 @@ class Worst(NamedTuple):
     Attributes:
         errors: Of each result: the largest error wherever it has a bound.
         shares: Of each result: the share of the domain without a bound.
-        sizes: Of each step: how far from 0 a computed number can be.
+        sizes: Of each step: how far from 0 a computed number can be; of a truth 1 or 0
+            if it is always or never true, else NaN.
     """
 
     errors: Array
@@ -394,7 +396,7 @@ def worst_over(
     low, high = _boxes(ranges)
     some = max(_NUMBERS // max(program.size, 1), 1)
     errors: list[Array] = []
-    sizes = np.zeros(len(program.steps))
+    sizes = np.zeros((-(-low.shape[1] // some), len(program.steps)))
     for start in range(0, low.shape[1], some):
         part = slice(start, start + some)
         every = spreads(program, low[:, part], high[:, part], rounding)
@@ -402,12 +404,24 @@ def worst_over(
         ends = [every[one.step].error * 1.0 for one in program.results]
         errors.append(np.array([np.broadcast_to(end, count) for end in ends]))
         for place, spread in enumerate(every):
-            if program.steps[place].kind == "number":
-                size = np.where(np.isnan(spread.low), 0.0, spread.size)
-                sizes[place] = max(sizes[place], float(size.max()))
+            sizes[start // some, place] = _size(program.steps[place], spread)
     table = np.hstack(errors)
     is_open = np.isinf(table)
-    return Worst(np.where(is_open, 0.0, table).max(axis=1), is_open.mean(axis=1), sizes)
+    most = np.where(is_open, 0.0, table).max(axis=1)
+    is_same = (sizes == sizes[0]).all(axis=0)
+    for place, step in enumerate(program.steps):
+        if step.kind == "truth" and not is_same[place]:
+            sizes[:, place] = np.nan
+    return Worst(most, is_open.mean(axis=1), sizes.max(axis=0))
+
+
+def _size(step: Step, spread: Spread) -> float:
+    """Return a number's distance from 0; of a truth what it surely is, or NaN."""
+    if step.kind == "number":
+        return float(np.where(spread.is_none, 0.0, spread.size).max())
+    is_true, may_be = spread.low.all(), spread.high.any()
+    is_sure = (is_true or not may_be) and not spread.error.any()
+    return float(is_true) if is_sure else math.nan
 
 
 def _boxes(ranges: Sequence[tuple[float, float]]) -> tuple[Array, Array]:
