@@ -453,7 +453,9 @@ def float32_rounding(program: Program) -> Rounding:
     def rounding(place: int, size: Array) -> Array:
         step = program.steps[place]
         if step.operation in _EXACT:
-            return np.zeros(1)
+            table = np.array(step.table)  # of `below`: rounded, it may count otherwise
+            is_exact = (table == table.astype(np.float32)).all()
+            return np.zeros(1) if is_exact else np.full(1, np.inf)
         if step.operation == "constant":
             exact: Array = np.abs(size - size.astype(np.float32))
             return exact
