@@ -165,7 +165,12 @@ def load_best_first(model: Model, *, with_strengths: bool = False) -> Run:
 def _load_system(system: FuzzySystem, dtype: Dtype, *, with_strengths: bool) -> Run:
     """Return a function that answers rows of a fuzzy system by compiled C."""
     file = write_c(
-        system, dtype=dtype, name="model", activations=with_strengths, selftest=False
+        system,
+        dtype=dtype,
+        name="model",
+        activations=with_strengths,
+        selftest=False,
+        tables=True,  # quicker where memory is no concern
     )
     return load_system_content(
         file.content, system, dtype, with_strengths=with_strengths
