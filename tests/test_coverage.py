@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.checking.representations import check
-from fuzzytree.checking.systems import coverage_of
+from fuzzytree.checking.subject import coverage_of
 from fuzzytree.model import (
     And,
     Conclusion,
@@ -175,7 +175,7 @@ def test_probing_thousands_of_rules_runs_fewer_rows_than_rules(
 
         return answer
 
-    monkeypatch.setattr("fuzzytree.checking.systems.run_system", counted)
+    monkeypatch.setattr("fuzzytree.checking.subject.run_system", counted)
     found = coverage_of(FuzzySystem("grid", inputs, (OUTPUT,), (block,)))
     assert (found.rules, found.unfired, found.uncovered) == (2401, (), 0)
     assert sum(widths) - found.rows < found.rules

@@ -4,11 +4,10 @@ from .abilities import Outcome as Outcome
 from .abilities import abilities_of as abilities_of
 from .abilities import dialects_of as dialects_of
 from .comparing import ModelRun as ModelRun
-from .comparing import compare_bits as compare_bits
+from .comparing import compare as compare
 from .comparing import counted as counted
 from .comparing import judged as judged
 from .comparing import labels as labels
-from .comparing import probed as probed
 from .comparing import row_set as row_set
 from .conformance import failures as failures
 from .converting import CALLED as CALLED
@@ -34,11 +33,11 @@ from .dependencies import Needs as Needs
 from .dependencies import needs as needs
 from .dependencies import prove as prove
 from .dependencies import sizes_of as sizes_of
-from .programs import ProgramFile as ProgramFile
+from .files import ProgramFile as ProgramFile
 from .representations import check as check
 from .stability.results import Criterion as Criterion
 from .stability.results import Move as Move
 from .stability.results import Stability as Stability
 from .stability.results import Stiff as Stiff
 from .stability.suite import examine as examine
-from .systems import coverage_of as coverage_of
+from .subject import coverage_of as coverage_of

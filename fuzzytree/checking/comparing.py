@@ -1,9 +1,15 @@
-"""Compare the predictions of two representations, row by row."""
+"""Compare the results of two representations, row by row.
+
+The results are those of the model's program: class, rule, status, strengths or degrees
+of activation, outputs, probabilities. Bits are compared first. Where they differ,
+numbers may be apart by a bound that is derived for that number and row, and a class, a
+rule or a status may be another one only where such a bound can change it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import NamedTuple, cast
 
 import msgspec
 import numpy as np
@@ -11,36 +17,34 @@ import numpy as np
 from fuzzytree.model import (
     Basis,
     BoolArray,
-    Certified,
     Comparison,
     Document,
-    Dtype,
     FileContent,
     FloatArray,
-    FuzzyTree,
     IntArray,
     Model,
     Outcome,
     RuleBase,
+    Unchecked,
     Verdict,
     kind_of,
 )
-from fuzzytree.numerics import (
-    Decisions,
-    certify,
-    open_paths,
-    strength_bounds,
-    strength_errors,
+from fuzzytree.runtimes import Predictions, answers_of, predictions_of
+from fuzzytree.semantics import (
+    ORIGIN,
+    Program,
+    ResultKind,
+    Status,
+    error_bounds,
 )
-from fuzzytree.runtimes import baseline, class_probabilities, predictions_of
-from fuzzytree.semantics import Status, probe_values
 
 _SHOWN = 5  # differing rows listed for each comparison
 _LISTED = 20  # differences in the content of a file
-_FLOAT32_TREE = "equal answers but within float32 rounding of a cut"
+_LEAST = 1e-300
+_EDGE = 1e-6  # share of the largest number; a wider bound of functions says little
 
-Finding = Comparison | FileContent | str
-"""A comparison, what a file holds, or a sentence about what was skipped."""
+Finding = Comparison | FileContent | Unchecked | str
+"""A comparison, what a file holds, or what was skipped."""
 
 OTHER_FUNCTION = (
     "it holds raw rules, another function than the tree; --terms raw compares it with "
@@ -77,8 +81,12 @@ class RowSet(msgspec.Struct, frozen=True):
             self.inputs, self.values[:, rows], self.numbers[rows], self.probes
         )
 
+    def share(self, most: int) -> RowSet:
+        """Return at most so many rows, evenly from all."""
+        return self.part(slice(None, None, max(-(-len(self.numbers) // most), 1)))
+
     def name(self, row: int) -> str:
-        """Return what people call a row: `probe 3`, or `row 3` of the data."""
+        """Return what people call a row: `generated row 3`, or `row 3` of the data."""
         number = int(self.numbers[row])
         if number < self.probes:
             return f"generated row {number + 1}"
@@ -108,20 +116,6 @@ def row_set(
     return RowSet(inputs, values, np.arange(values.shape[1]), count)
 
 
-def probed(model: Model, data: FloatArray | None, limit: int) -> RowSet:
-    """Return probes of a model with the user's rows behind them.
-
-    Args:
-        model: A tree or a rule base.
-        data: Rows of one's own, shape (inputs, rows), in the order of `model.inputs`.
-        limit: The most probes.
-
-    Raises:
-        ValueError: If `data` has another shape.
-    """
-    return row_set(model.inputs, probe_values(model, limit), data)
-
-
 class ModelRun(msgspec.Struct, frozen=True):
     """What a representation answered to some rows.
 
@@ -132,7 +126,7 @@ class ModelRun(msgspec.Struct, frozen=True):
     """
 
     title: str
-    model: Model
+    model: Document
     outcome: Outcome
 
     def part(self, rows: slice | IntArray) -> ModelRun:
@@ -182,56 +176,115 @@ def judged(
     )
 
 
-def compare_bits(
-    actual: ModelRun,
-    expected: ModelRun,
-    rows: RowSet,
-    *,
-    excused: BoolArray | None = None,
-    origin: str = _FLOAT32_TREE,
-) -> Comparison:
-    """Demand equal rules, classes, statuses, and strengths where both have them.
+# --- results
 
-    Strengths are compared bit by bit: 0.0 is not -0.0, and NaN is one value; so are
-    probabilities, where the first one has them. Rows that
-    are excused may differ, for the reason that `origin` states.
+
+Key = tuple[ResultKind, str]
+"""The kind and name of a result, as the model's program has them."""
+
+_NAMES: tuple[ResultKind, ...] = ("class", "rule", "status")  # no amounts
+
+
+class Results(NamedTuple):
+    """What two runs gave in the rows in which a bit differs.
+
+    Attributes:
+        keys: Which results they are.
+        actual: Those of the one, shape (results, rows); a class is its place.
+        expected: Those of the other.
+        rows: The places of the rows among all.
+        run: The other run, in these rows.
     """
-    gap = strength_gap(actual.outcome, expected.outcome)
-    wrong = unequal(actual.outcome, expected.outcome)
-    wrong |= labels(actual) != labels(expected)
-    wrong |= _other_probabilities(actual, expected)
-    if excused is None:
-        return _compared(actual, expected, rows, wrong, gap)
-    return _compared(actual, expected, rows, wrong & ~excused, gap, origin=origin)
+
+    keys: tuple[Key, ...]
+    actual: FloatArray
+    expected: FloatArray
+    rows: IntArray
+    run: ModelRun
+
+    def is_of(self, *kinds: ResultKind) -> BoolArray:
+        """Return which results are of these kinds, of shape (results, 1)."""
+        chosen = [kind in kinds for kind, _ in self.keys]
+        return np.array(chosen, np.bool_).reshape(-1, 1)
 
 
-def _other_probabilities(actual: ModelRun, expected: ModelRun) -> BoolArray:
-    """Return the rows in which a runtime's probabilities are not the model's."""
-    result, strengths = actual.outcome.probabilities, expected.outcome.strengths
-    model = expected.model
-    if result is None or strengths is None or not isinstance(model, RuleBase):
-        return np.zeros(actual.outcome.rule.shape, np.bool_)
-    right = class_probabilities(model, strengths, expected.outcome.rule)
-    if right is None or right.shape != result.shape:
-        return np.ones(actual.outcome.rule.shape, np.bool_)
-    wrong = np.zeros(actual.outcome.rule.shape, np.bool_)
-    wrong |= ~same_bits(result, right).all(axis=0)
-    return wrong
+def results_of(
+    actual: ModelRun, expected: ModelRun, kinds: Collection[str] | None = None
+) -> Results:
+    """Return the results of two runs in the rows in which a bit differs.
+
+    Results that only one of the two has are left out; of strengths that are more in one
+    than in the other, the other's are NaN.
+
+    Args:
+        actual: What is compared.
+        expected: With what.
+        kinds: Which results are compared; all that both have if None.
+    """
+    strengths = expected.outcome.strengths
+    if actual.outcome.probabilities is not None and strengths is not None:
+        answers = answers_of(expected.outcome, expected.model, with_probabilities=True)
+        shares = getattr(answers, "probabilities", None)
+        outcome = msgspec.structs.replace(expected.outcome, probabilities=shares)
+        expected = msgspec.structs.replace(expected, outcome=outcome)
+    differs = unequal(actual.outcome, expected.outcome)
+    names = answer_names(expected)
+    if expected.outcome.outputs is None:
+        differs |= labels(actual, names) != labels(expected)
+    rows = np.flatnonzero(differs)
+    run = expected.part(rows)
+    one, two = _table(actual.part(rows), names), _table(run, names)
+    shared = {kind for kind, _ in one} & {kind for kind, _ in two}
+    shared &= shared if kinds is None else set(kinds)
+    keys = tuple(key for key in {**two, **one} if key[0] in shared)
+    nothing = np.full(rows.shape, np.nan)
+    numbers = (
+        np.array([part.get(key, nothing) for key in keys], np.float64)
+        for part in (one, two)
+    )
+    first, second = (table.reshape(len(keys), rows.size) for table in numbers)
+    return Results(keys, first, second, rows, run)
 
 
-def unequal(one: Outcome, two: Outcome) -> BoolArray:
-    """Return the rows in which two outcomes differ, by a single bit if in no more."""
-    wrong: BoolArray = (one.rule != two.rule) | (one.status != two.status)
-    for kind in ("strengths", "outputs"):
-        first, second = getattr(one, kind), getattr(two, kind)
-        if first is not None and second is not None:
-            if first.shape != second.shape:
-                return np.ones_like(wrong)
-            wrong |= ~same_bits(first, second).all(axis=0)
-    return wrong
+def _table(run: ModelRun, names: Sequence[str]) -> dict[Key, FloatArray | IntArray]:
+    """Return all results of a run, by kind and name."""
+    outcome, is_system = run.outcome, run.outcome.outputs is not None
+    blocks: dict[ResultKind, FloatArray | IntArray | None] = {
+        "class": None if is_system else labels(run, names)[None],
+        "rule": None if is_system else outcome.rule[None],
+        "status": outcome.status[None],
+        "output": outcome.outputs,
+        "activation" if is_system else "strength": outcome.strengths,
+        "probability": outcome.probabilities,
+    }
+    table: dict[Key, FloatArray | IntArray] = {}
+    for kind, lines in blocks.items():
+        titles = [kind] if kind in _NAMES else names
+        if lines is None:
+            continue
+        if kind in ("activation", "strength"):
+            titles = [str(number) for number in range(1, 1 + len(lines))]
+        table |= {(kind, x): y for x, y in zip(titles, lines, strict=True)}
+    return table
 
 
-def same_bits(one: FloatArray, two: FloatArray) -> BoolArray:
+def answer_names(run: ModelRun) -> tuple[str, ...]:
+    """Return the classes or the outputs that a model answers."""
+    answers = answers_of(run.outcome, run.model)
+    return answers.choices if isinstance(answers, Predictions) else answers.names
+
+
+def labels(answers: ModelRun, names: Sequence[str] | None = None) -> IntArray:
+    """Return the class number of each answer, among `names` if given; -1 for none."""
+    classes = predictions_of(answers.outcome, cast("Model", answers.model))
+    if names is None or (*names,) == classes.choices:
+        return classes.codes
+    order = [*names, *(name for name in classes.choices if name not in names)]
+    places: IntArray = np.array([*map(order.index, classes.choices), -1])
+    return places[classes.codes]
+
+
+def same_bits(one: FloatArray | IntArray, two: FloatArray | IntArray) -> BoolArray:
     """Return where two arrays of a shape have the same bits; NaN is one value.
 
     Example:
@@ -243,120 +296,20 @@ def same_bits(one: FloatArray, two: FloatArray) -> BoolArray:
     return same | (np.isnan(one) & np.isnan(two))
 
 
-def compare_within(
-    actual: ModelRun,
-    expected: ModelRun,
-    rows: RowSet,
-    *,
-    allowed: FloatArray,
-    origin: str,
-) -> Comparison:
-    """Allow a difference of strengths, and what must follow from it, and no more.
+def unequal(one: Outcome, two: Outcome) -> BoolArray:
+    """Return the rows in which two outcomes differ, by a single bit if in no more.
 
-    A class may differ only where the two strongest classes are at most twice the
-    allowed difference apart. Rows in which 1 is allowed prove nothing and are counted
-    as such.
-
-    The result shows what is `allowed` in the row that exceeds it most, or else in that
-    of the largest difference, and its `origin`.
+    What only one of them has is not compared.
     """
-    is_bound = allowed < 1.0
-    apart = strength_gap(actual.outcome, expected.outcome)
-    gap = np.where(is_bound, apart, 0.0)
-    flips = labels(actual) != labels(expected)
-    margin = margins(expected)
-    close = np.zeros_like(flips) if margin is None else margin <= 2 * allowed
-    wrong = is_bound & ((gap > allowed) | (flips & ~close))
-    excess = gap / np.maximum(allowed, 1e-300) if wrong.any() else gap
-    limit = float(allowed[np.argmax(excess)]) if gap.size else 0.0
-    return msgspec.structs.replace(
-        _compared(actual, expected, rows, wrong, gap, limit, origin),
-        unbounded=int((~is_bound).sum()),
-        largest_unbounded=float(apart[~is_bound].max(initial=0.0)),
-    )
-
-
-def compare_answers(
-    actual: ModelRun,
-    expected: ModelRun,
-    rows: RowSet,
-    *,
-    by_design: bool = False,
-) -> Comparison:
-    """Compare classes and missing rows alone.
-
-    `by_design` says that the two are different functions, so that a difference is
-    reported and not a fault.
-    """
-    flips = labels(actual) != labels(expected)
-    gap = np.zeros(flips.shape)
-    verdict: Verdict | None = "differs by design" if by_design and flips.any() else None
-    return _compared(
-        actual, expected, rows, flips, gap, origin="equal classes", verdict=verdict
-    )
-
-
-def _without_status(answers: ModelRun) -> ModelRun:
-    """Reduce statuses to whether a rule won."""
-    outcome = answers.outcome
-    status = np.where(outcome.rule > 0, Status.DECIDED, Status.UNCOVERED)
-    kept = msgspec.structs.replace(outcome, status=status.astype(np.int64))
-    return msgspec.structs.replace(answers, outcome=kept)
-
-
-class FileAnswers(NamedTuple):
-    """What a file answers to some rows.
-
-    Attributes:
-        outcome: Rules and statuses; None if they are not compared.
-        labels: The texts that it answers; None if it has none.
-        has_status: Whether the statuses are the file's own.
-    """
-
-    outcome: Outcome | None
-    labels: Sequence[str | None] | None
-    has_status: bool
-
-
-def compare_file(
-    title: str,
-    answers: FileAnswers,
-    base: ModelRun,
-    rows: RowSet,
-    *,
-    is_float32: bool,
-    origin: str = _FLOAT32_TREE,
-) -> Iterator[Comparison]:
-    """Compare what a file answers with the native runtime, then its labels.
-
-    Rows of a tree within float32 rounding of a cut are excused if the file computes in
-    that type; `origin` says so.
-    """
-    excused = None
-    if is_float32 and isinstance(base.model, FuzzyTree):
-        excused = open_paths(base.model, "float32", rows.values)
-    if answers.outcome is not None:
-        actual, right = ModelRun(title, base.model, answers.outcome), base
-        if not answers.has_status:
-            actual, right = _without_status(actual), _without_status(base)
-        yield compare_bits(actual, right, rows, excused=excused, origin=origin)
-    if answers.labels is not None:
-        classes = [*base.model.classes, None]
-        wanted = [classes[number] for number in labels(base).tolist()]
-        faults = [
-            f"{rows.name(row)}: label {text!r} where {label!r} is right"
-            for row, (text, label) in enumerate(
-                zip(answers.labels, wanted, strict=True)
-            )
-            if text != label and (excused is None or not excused[row])
-        ]
-        yield counted("rows", title, "the model's classes", len(wanted), faults)
-
-
-def native_base(model: Model, dtype: Dtype, rows: RowSet) -> ModelRun:
-    """Return the native answers with which a file of a number type is compared."""
-    native = baseline(dtype if isinstance(model, RuleBase) else "float64")
-    return ModelRun("the model", model, native.load(model)(rows.values))
+    wrong: BoolArray = np.zeros(one.status.shape, np.bool_)
+    arrays = map(msgspec.structs.astuple, (one, two))
+    for first, second in zip(*arrays, strict=True):
+        if first is None or second is None:
+            continue
+        if first.shape != second.shape:
+            return np.ones_like(wrong)
+        wrong |= ~same_bits(first, second).reshape(-1, wrong.size).all(axis=0)
+    return wrong
 
 
 def strength_gap(actual: Outcome, expected: Outcome) -> FloatArray:
@@ -369,214 +322,249 @@ def strength_gap(actual: Outcome, expected: Outcome) -> FloatArray:
         return np.zeros(actual.rule.shape)
     if one.shape != two.shape:
         return np.full(actual.rule.shape, np.inf)
-    gap = np.abs(one - two)
-    gap[np.isnan(one) & np.isnan(two)] = 0.0
-    gap[np.isnan(gap)] = np.inf
-    largest: FloatArray = gap.max(axis=0, initial=0.0)
+    largest: FloatArray = _gaps(one, two).max(axis=0, initial=0.0)
     return largest
 
 
-def labels(answers: ModelRun) -> IntArray:
-    """Return the class number of each answer; -1 for no class."""
-    return predictions_of(answers.outcome, answers.model).codes
+def _gaps(one: FloatArray, two: FloatArray) -> FloatArray:
+    """Return how far numbers are apart; NaN is infinitely far from any other."""
+    with np.errstate(invalid="ignore"):
+        gaps: FloatArray = np.abs(one - two)
+    gaps[np.isnan(gaps)] = np.inf
+    gaps[(one == two) | (np.isnan(one) & np.isnan(two))] = 0.0
+    return gaps
 
 
 def margins(answers: ModelRun) -> FloatArray | None:
     """Return how far the strongest class is ahead of the next, in each row."""
-    model, strengths = answers.model, answers.outcome.strengths
-    if strengths is None or isinstance(model, FuzzyTree):
-        return None
-    owners = np.array([model.classes.index(rule.then) for rule in model.rules])
-    best = np.zeros((len(model.classes) + 1, strengths.shape[1]))
-    for number in range(len(model.classes)):
-        best[number] = strengths[owners == number].max(axis=0, initial=0.0)
-    top = np.sort(best, axis=0)
-    apart: FloatArray = np.nan_to_num(top[-1] - top[-2], nan=0.0)
-    return apart
+    named = answers_of(answers.outcome, answers.model, with_strengths=True)
+    strengths = named.class_strengths if isinstance(named, Predictions) else None
+    return None if strengths is None else _leads(strengths)
 
 
-def _compared(
+def _leads(strengths: FloatArray) -> FloatArray:
+    """Return how far the largest of each column is ahead of the next, or of 0."""
+    top = np.sort(np.vstack([strengths, np.zeros((2, strengths.shape[1]))]), axis=0)
+    leads: FloatArray = np.nan_to_num(top[-1] - top[-2], nan=0.0)
+    return leads
+
+
+# --- how far results may be apart
+
+
+class Allowance(NamedTuple):
+    """How far results may be apart, of shape (results, rows).
+
+    Attributes:
+        amounts: 0 demands equal bits, infinity nothing.
+        is_loose: Where that says so little that it is counted apart.
+        origin: Where it comes from.
+    """
+
+    amounts: FloatArray
+    is_loose: BoolArray
+    origin: str
+
+
+Allow = Callable[[Results, FloatArray], Allowance]
+"""What is allowed, from results that differ and the values of their rows."""
+
+
+def equal_bits(results: Results, values: FloatArray) -> Allowance:
+    """Allow nothing."""
+    nothing = np.zeros(results.actual.shape)
+    return Allowance(nothing, nothing > 0.0, "equal bits")
+
+
+def by_libraries(program: Callable[[], Program]) -> Allow:
+    """Allow what functions of libraries differ by: nothing where there are none.
+
+    A bound wider than a millionth of the largest number is counted apart: last bits
+    decide there, so near is an edge or a division by 0.
+    """
+
+    def allow(results: Results, values: FloatArray) -> Allowance:
+        made = program()
+        bounds = error_bounds(made, values)
+        pairs = zip(made.results, bounds, strict=True)
+        bound_of = {(result.kind, result.name): bound for result, bound in pairs}
+        amounts = equal_bits(results, values).amounts
+        for line, key in enumerate(results.keys):
+            amounts[line] = bound_of.get(key, 0.0)
+        size = np.nan_to_num(np.abs(results.expected), posinf=0.0)
+        largest = np.maximum(size.max(axis=1, initial=0.0, keepdims=True), _LEAST)
+        origin = ORIGIN if amounts.any() else "equal bits"
+        return Allowance(amounts, amounts > _EDGE * largest, origin)
+
+    return allow
+
+
+def within(bound: Callable[[FloatArray], tuple[FloatArray, str]]) -> Allow:
+    """Allow a difference of strengths in each row, and what must follow from it.
+
+    A class may differ only where the two strongest classes are at most twice as far
+    apart, rule and status only where the two strongest rules are. Rows in which 1 is
+    allowed prove nothing and are counted as such.
+    """
+
+    def allow(results: Results, values: FloatArray) -> Allowance:
+        limit, origin = bound(values)
+        is_loose = np.broadcast_to(limit >= 1.0, results.actual.shape)
+        strengths, lead = results.run.outcome.strengths, margins(results.run)
+        amounts = np.where(is_loose, np.inf, limit)
+        if strengths is not None and lead is not None:
+            leads = np.where(results.is_of("class"), lead, _leads(strengths))
+            decided = np.where(is_loose | (leads <= 2.0 * limit), np.inf, 0.0)
+            amounts = np.where(results.is_of(*_NAMES), decided, amounts)
+        return Allowance(amounts, is_loose & ~results.is_of(*_NAMES), origin)
+
+    return allow
+
+
+def excused(where: Callable[[FloatArray], BoolArray], origin: str) -> Allow:
+    """Allow everything in some rows, and nothing in others."""
+
+    def allow(results: Results, values: FloatArray) -> Allowance:
+        nothing, is_loose, _ = equal_bits(results, values)
+        return Allowance(np.where(where(values), np.inf, nothing), is_loose, origin)
+
+    return allow
+
+
+# --- comparing
+
+
+class Differences(NamedTuple):
+    """Where two runs differ in a bit, and in more than is allowed.
+
+    Attributes:
+        results: Of both, in the rows that differ.
+        gaps: How far the results are apart.
+        allowance: How far they may be.
+        wrong: Which of the rows differ in more, worst first.
+    """
+
+    results: Results
+    gaps: FloatArray
+    allowance: Allowance
+    wrong: IntArray
+
+
+def differences(
     actual: ModelRun,
     expected: ModelRun,
     rows: RowSet,
-    wrong: BoolArray,
-    gap: FloatArray,
-    allowed: float = 0.0,
-    origin: str = "equal bits",
-    verdict: Verdict | None = None,
+    allow: Allow = equal_bits,
+    *,
+    kinds: Collection[str] | None = None,
+) -> Differences:
+    """Return where two runs differ, and in more than is allowed."""
+    results = results_of(actual, expected, kinds)
+    gaps = _gaps(results.actual, results.expected)
+    is_signed = ~same_bits(results.actual, results.expected) & (gaps == 0.0)
+    gaps[is_signed & ~results.is_of("output", "activation")] = _LEAST
+    allow = allow if results.rows.size else equal_bits
+    allowance = allow(results, rows.values[:, results.rows])
+    size = np.where(results.is_of(*_NAMES), 0.0, gaps).max(axis=0, initial=0.0)
+    wrong = np.flatnonzero((gaps > allowance.amounts).any(axis=0))
+    wrong = wrong[np.argsort(-size[wrong], kind="stable")]
+    return Differences(results, gaps, allowance, wrong)
+
+
+def compare(
+    actual: ModelRun,
+    expected: ModelRun,
+    rows: RowSet,
+    allow: Allow = equal_bits,
+    *,
+    kinds: Collection[str] | None = None,
+    by_design: bool = False,
 ) -> Comparison:
-    flips = labels(actual) != labels(expected)
-    margin = margins(expected)
-    shown = np.flatnonzero(wrong)
-    shown = shown[np.argsort(-gap[shown], kind="stable")][:_SHOWN]
-    detail = [_row_text(actual, expected, rows, row) for row in shown.tolist()]
-    if detail and gap.any() and not flips.any():
-        detail.insert(0, "only strengths differ: every row has the same class")
+    """Compare two runs: bits, and where they differ what is allowed.
+
+    Args:
+        actual: What is compared.
+        expected: With what.
+        rows: The rows of both.
+        allow: How far results may be apart.
+        kinds: Which results are compared; all that both have if None.
+        by_design: Whether the two are different functions, so that a difference is
+            reported and is no fault.
+    """
+    apart = differences(actual, expected, rows, allow, kinds=kinds)
+    results, gaps, (allowed, is_loose, origin), wrong = apart
+    same = len(rows.numbers) - results.rows.size
+    if kinds == ("class",):
+        origin = "equal classes"
+    elif not results.rows.size:
+        origin = "equal bits"
+    elif origin != "equal bits":
+        origin += f"; equal bits in {same} rows"
+    has_class = bool(results.is_of("class").any())
+    is_flip = results.is_of("class" if has_class else "status") & (gaps > 0.0)
+    flips = np.flatnonzero(is_flip.any(axis=0))
+    lead = margins(results.run.part(flips)) if flips.size else None
+    gaps = np.where(results.is_of(*_NAMES) | (gaps == _LEAST), 0.0, gaps)
+    bounded = np.where(is_loose & (gaps <= allowed), 0.0, gaps)
+    with np.errstate(over="ignore"):
+        excess = bounded / np.maximum(allowed, _LEAST) if wrong.size else bounded
+    worst = int(np.argmax(excess)) if excess.size else None
+    texts = [_row_text(apart, rows, place) for place in wrong[:_SHOWN].tolist()]
+    if texts and has_class and bounded.any() and not flips.size:
+        texts.insert(0, "only strengths differ: every row has the same class")
+    verdict: Verdict = "differs by design" if by_design else "DISAGREES"
     return Comparison(
         actual.title,
         expected.title,
         "rows",
-        int(wrong.size),
-        verdict or ("DISAGREES" if wrong.any() else "agrees"),
-        differing=int(wrong.sum()),
-        largest_difference=float(gap.max(initial=0.0)),
-        allowed=allowed,
+        len(rows.numbers),
+        verdict if wrong.size else "agrees",
+        differing=int(wrong.size),
+        largest_difference=float(bounded.max(initial=0.0)),
+        allowed=0.0 if worst is None else float(allowed.flat[worst]),
         origin=origin,
-        flips=int(flips.sum()),
-        largest_flip_margin=(
-            float(margin[flips].max()) if margin is not None and flips.any() else None
-        ),
-        detail=tuple(detail),
-        row_numbers=tuple(rows.numbers[shown].tolist()),
+        flips=int(flips.size),
+        largest_flip_margin=None if lead is None else float(lead.max()),
+        detail=tuple(texts),
+        row_numbers=tuple(rows.numbers[results.rows[wrong[:_SHOWN]]].tolist()),
+        unbounded=int(is_loose.any(axis=0).sum()),
+        largest_unbounded=float(gaps[is_loose].max(initial=0.0)),
     )
 
 
-def _row_text(actual: ModelRun, expected: ModelRun, rows: RowSet, row: int) -> str:
-    wanted, got = _answer_text(expected, row), _answer_text(actual, row)
-    if wanted == got:
-        apart = _apart(actual, expected, row)
-        one, two = actual.part(slice(row, row + 1)), expected.part(slice(row, row + 1))
-        if not unequal(one.outcome, two.outcome).any():
-            apart = ", with other probabilities"
-        return f"{rows.text(row)}: both answer {got}{apart}"
-    return f"{rows.text(row)}: {expected.title} answers {wanted}, {actual.title} {got}"
+def _row_text(apart: Differences, rows: RowSet, place: int) -> str:
+    """Return a row with what is wrong in it: names, or else the worst amount."""
+    results, allowed = apart.results, apart.allowance.amounts[:, place]
+    gaps = apart.gaps[:, place]
+    wrong = np.flatnonzero(gaps > allowed).tolist()
+    lines = [line for line in wrong if results.keys[line][0] in _NAMES]
+    parts: list[str] = []
+    for line in lines or sorted(wrong, key=lambda line: -float(gaps[line]))[:1]:
+        kind, name = results.keys[line]
+        one, two = (
+            _shown(kind, float(numbers[line, place]), answer_names(results.run))
+            for numbers in (results.actual, results.expected)
+        )
+        bound = float(allowed[line])
+        more = "" if bound == 0.0 else f", which may differ by {bound:.2g}"
+        title = _TITLES.get(kind, kind).format(name)
+        parts.append(f"{title} {one} where {two} is right{more}")
+    return f"{rows.text(int(results.rows[place]))}: {', '.join(parts)}"
 
 
-def _apart(actual: ModelRun, expected: ModelRun, row: int) -> str:
-    """Return where the strengths of a row are furthest apart, in words."""
-    one, two = actual.outcome.strengths, expected.outcome.strengths
-    if one is None or two is None or one.shape != two.shape:
-        return ""
-    gap = np.abs(one[:, row] - two[:, row])
-    gap = np.where(np.isnan(gap), np.inf, gap)
-    if not gap.any():  # they differ in the sign of a zero
-        gap = 1.0 - same_bits(one[:, row], two[:, row])
-    rule = int(np.argmax(gap))
-    right, other = float(two[rule, row]), float(one[rule, row])
-    return (
-        f"; the strength of rule {rule + 1} is {right!r} in {expected.title}, "
-        f"{other!r} in {actual.title}"
-    )
+def _shown(kind: ResultKind, number: float, classes: Sequence[str]) -> str:
+    words = {-1: "no class", **dict(enumerate(classes))}
+    if kind == "status":
+        words = {int(status): status.name.lower() for status in Status}
+    if kind in ("class", "status"):
+        return words.get(int(number), "another")
+    return str(int(number)) if kind == "rule" else repr(number)
 
 
-def _answer_text(answers: ModelRun, row: int) -> str:
-    outcome = answers.outcome
-    rule, status = int(outcome.rule[row]), Status(int(outcome.status[row]))
-    number = int(labels(answers)[row])
-    label = answers.model.classes[number] if number >= 0 else "no class"
-    text = f"{label} (rule {rule})" if rule else label
-    if outcome.strengths is not None and rule:
-        text += f" with {float(outcome.strengths[rule - 1, row])!r}"
-    return text if status is Status.DECIDED else f"{text} ({status.name.lower()})"
-
-
-# --- against exact arithmetic
-
-
-def compare_exact(
-    actual: ModelRun, truth: Decisions, rows: RowSet, *, dtype: Dtype
-) -> Certified:
-    """Compare predictions with the exact ones, within what a number type may change.
-
-    A strength may be off by its bound in that row; a class may differ where the exact
-    margin is at most twice that, or where a value lies within its rounding from a cut
-    of the tree, and nowhere else.
-
-    Rows of the data are counted if there are any.
-    """
-    allowed = np.zeros(len(rows.numbers))
-    if isinstance(actual.model, RuleBase):
-        allowed, _ = strength_bounds(actual.model, dtype, rows.values)
-    low, flips, close = exact_errors(actual, truth, rows.values, dtype, allowed)
-    wrong = flips & ~close
-    if low is not None:
-        wrong |= (low > allowed) & (allowed < 1.0)
-    is_data = len(rows.numbers) > rows.probes
-    own = rows.numbers >= (rows.probes if is_data else 0)
-    facts = certify(actual.model, dtype, rows.values[:, own] if is_data else None)
-    if facts.reasons and not is_data:
-        facts = certify(actual.model, dtype, rows.values)
-    lost, gained = _cover(actual, truth)
-    flipped = truth.margin_high[own & flips]
-    bounded = own & (allowed < 1.0)
-    return Certified(
-        actual.title,
-        dtype,
-        facts.sentence,
-        facts.delta,
-        facts.origin,
-        "data" if is_data else "probes",
-        int(own.sum()),
-        None if low is None else float(low[bounded].max(initial=0.0)),
-        int((own & close).sum()),
-        int((own & flips).sum()),
-        float(flipped.max()) if low is not None and flipped.size else None,
-        int((lost & own).sum()),
-        int((gained & own).sum()),
-        int((own & (allowed >= 1.0)).sum()) if low is not None else 0,
-        "DISAGREES" if wrong.any() else "agrees",
-        tuple(_exact_texts(actual, truth, rows, wrong, allowed, low)),
-    )
-
-
-class ExactErrors(NamedTuple):
-    """How far predictions are from the exact ones, in each row.
-
-    Attributes:
-        low: By how much a strength is off at least; None without strengths.
-        flips: Whether the class differs.
-        close: Whether it may: the exact margin is at most twice what is allowed, or a
-            value lies within its rounding from a cut of a tree.
-    """
-
-    low: FloatArray | None
-    flips: BoolArray
-    close: BoolArray
-
-
-def exact_errors(
-    actual: ModelRun,
-    truth: Decisions,
-    values: FloatArray,
-    dtype: Dtype,
-    allowed: FloatArray,
-) -> ExactErrors:
-    """Return the errors of predictions, where a strength may be off by `allowed`."""
-    flips = labels(actual) != truth.label
-    model, strengths = actual.model, actual.outcome.strengths
-    if isinstance(model, FuzzyTree):
-        return ExactErrors(None, flips, open_paths(model, dtype, values))
-    low = None if strengths is None else strength_errors(model, values, strengths)[0]
-    return ExactErrors(low, flips, truth.margin <= 2.0 * allowed)
-
-
-def _cover(actual: ModelRun, truth: Decisions) -> tuple[BoolArray, BoolArray]:
-    """Return which rows lost and gained cover."""
-    weighed = (actual.outcome.status != Status.MISSING) & (
-        truth.status != Status.MISSING
-    )
-    is_covered, should = actual.outcome.rule > 0, truth.rule > 0
-    return should & ~is_covered & weighed, is_covered & ~should & weighed
-
-
-def _exact_texts(
-    actual: ModelRun,
-    truth: Decisions,
-    rows: RowSet,
-    wrong: BoolArray,
-    allowed: FloatArray,
-    low: FloatArray | None,
-) -> Iterator[str]:
-    worst = np.flatnonzero(wrong)
-    if low is not None:
-        worst = worst[np.argsort(-low[worst], kind="stable")]
-    classes = actual.model.classes
-    for row in worst[:_SHOWN].tolist():
-        number = int(truth.label[row])
-        label = classes[number] if number >= 0 else "no class"
-        text = f"{rows.text(row)}: exactly {label} (rule {truth.rule[row]})"
-        text += f", {actual.title} {_answer_text(actual, row)}"
-        if low is not None:
-            text += f"; a strength is off by {low[row]:.2g}, and "
-            text += f"{allowed[row]:.2g} is allowed"
-        yield text
+_TITLES: Mapping[ResultKind, str] = {
+    "output": "output {!r}",
+    "strength": "strength of rule {}",
+    "activation": "activation of rule {}",
+    "probability": "probability of {}",
+}
+"""What people call an amount, by its kind and with its name."""

@@ -203,13 +203,13 @@ def read_content(content: bytes, form: Format, *, name: str) -> Reading:
         from fuzzytree.checking.engines import with_answers
 
         reading = with_answers(reading, functools.partial(form.read, content, name))
-    if not isinstance(reading.model, FuzzySystem):
+    if not reading.model.outputs:
         return reading
     narrow = [
         f"term {label.name!r} of {output.name!r} is 0 at all "
         f"{len(sampled_values(output))} values at which the range is sampled: rules "
         "that conclude it change nothing"
-        for output, label in unsampled_terms(reading.model)
+        for output, label in unsampled_terms(cast("FuzzySystem", reading.model))
     ]
     return msgspec.structs.replace(reading, remarks=(*reading.remarks, *narrow))
 
@@ -261,7 +261,7 @@ def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
             no model can represent.
         LossError: As `load`.
     """
-    if isinstance(source, FuzzyTree | RuleBase | FuzzySystem):
+    if isinstance(source, Document):
         return source
     if isinstance(source, str | os.PathLike):
         return load(source, allow_loss=allow_loss)
@@ -309,12 +309,12 @@ def deciding(model: Document, verb: str) -> Model:
     Raises:
         ReadError: If it is a fuzzy system, whose outputs are numbers.
     """
-    if isinstance(model, FuzzySystem):
+    if model.outputs:
         raise ReadError(
             f"{model.name} is a fuzzy system, which decides for no class; "
             f"{verb} takes a tree or a rule base"
         )
-    return model
+    return cast("Model", model)
 
 
 def losses_text(losses: Sequence[Loss], name: str) -> str:
@@ -351,8 +351,9 @@ def formed(
         LossError: If the format does not carry it in any form.
         ValueError: If the model has no such form.
     """
-    _refuse_remaking(model, representation, kind, conjunction)
-    if isinstance(model, FuzzyTree):
+    if not isinstance(model, FuzzyTree):
+        _refuse_remaking(model, representation, kind, conjunction)
+    else:
         usual = "rules" if kind or conjunction else _nearest("tree", form)
         if (representation or usual) == "tree":
             return model
@@ -362,9 +363,9 @@ def formed(
         return model
     from fuzzytree.semantics import as_rules, as_system
 
-    if isinstance(model, RuleBase):
-        return as_system(model, scores="winner")
-    rules = as_rules(model, None)
+    if not model.outputs:
+        return as_system(cast("RuleBase", model), scores="winner")
+    rules = as_rules(cast("FuzzySystem", model), None)
     if rules is not None:
         return rules
     if representation == "rules":
@@ -416,25 +417,24 @@ def _nearest(representation: ModelKind, form: Format) -> ModelKind:
 
 
 def _refuse_remaking(
-    model: Document,
+    model: RuleBase | FuzzySystem,
     representation: ModelKind | None,
     kind: Kind | None,
     conjunction: Conjunction | None,
 ) -> None:
-    """Refuse what can be made of a tree alone.
+    """Refuse what can be made of a tree alone, unless the model is of that form.
 
     Raises:
-        ValueError: If the model is none, and is not of that form already.
+        ValueError: If it is not.
     """
-    if isinstance(model, FuzzyTree):
-        return
     what = f"{model.name} is a {CALLED[kind_of(model)]}"
     if representation == "tree":
         raise ValueError(f"as tree: {what}, and no tree can be made of it")
     own: dict[str, str | None] = {}
     why = "; such rules are made from a tree"
-    if isinstance(model, RuleBase):
-        own = {"terms": model.kind, "conjunction": model.semantics.conjunction}
+    if not model.outputs:
+        rules = cast("RuleBase", model)
+        own = {"terms": rules.kind, "conjunction": rules.semantics.conjunction}
     for option, wanted in (("terms", kind), ("conjunction", conjunction)):
         if wanted is not None and wanted != own.get(option):
             if own:
@@ -498,23 +498,27 @@ def proved(
         DisagreementError: If the file is read back as another model, though the writer
             and the reader reported nothing.
     """
-    if not isinstance(model, FuzzySystem):
+    if not model.outputs:
         return _proved(model, form, written, dtype=dtype)
+    system = cast("FuzzySystem", model)
     if form.read is None and form.name == "onnx" and not written.losses:
-        return _run(model, written)
-    from fuzzytree.checking.systems import coverage_of
+        return _run(system, written)
+    from fuzzytree.checking.subject import coverage_of
 
     proof = _proved(model, form, written, dtype=dtype)
-    return msgspec.structs.replace(proof, coverage=coverage_of(model))
+    return msgspec.structs.replace(proof, coverage=coverage_of(system))
 
 
 def _proved(model: Document, form: Format, written: Written, *, dtype: object) -> Proof:
+    from fuzzytree.numerics import Certificate, certify
+
     if form.read is None:
-        if isinstance(model, FuzzySystem):
+        if form.dtype is None or model.outputs:
             return Proof("unproved", _NOT_READ)
-        if form.dtype is not None:
-            return _certified(model, form, dtype)
-        return Proof("unproved", _NOT_READ)
+        wanted = [name for name in get_args(Dtype) if name in (dtype, form.dtype)]
+        known = dtype if dtype in wanted else wanted[0]
+        facts = certify(cast("Model", model), cast("Dtype", known), None)
+        return Proof("certified", facts.sentence, facts)
     try:
         again = form.read(written.content, form.name)
     except ReadError as error:
@@ -526,7 +530,8 @@ def _proved(model: Document, form: Format, written: Written, *, dtype: object) -
         case "equal":
             what = CALLED[kind_of(model)]
             text = f"read back from the file, the {what} is equal in every number"
-            return Proof("equal", text, _exact(model, text))
+            exact = Certificate(None, kind_of(model), 0.0, text)
+            return Proof("equal", text, None if model.outputs else exact)
         case "alike":
             text = "read back from the file, it is equal but for names and notes"
             return Proof("alike", text)
@@ -542,12 +547,13 @@ def _proved(model: Document, form: Format, written: Written, *, dtype: object) -
 
 def _decided(model: Document, other: Document) -> str:
     """Return what a loss did to the decisions of rules, in words; empty for others."""
-    if not (isinstance(model, RuleBase) and isinstance(other, RuleBase)):
+    if model.outputs or other.outputs or not model.rules:
         return ""
     if len(model.rules) != len(other.rules) or model.inputs != other.inputs:
         return ""
-    rows = probes(model, limit=_TRIED)
-    changed = [r for r in rows if evaluate(model, r).rule != evaluate(other, r).rule]
+    one, two = cast("RuleBase", model), cast("RuleBase", other)
+    rows = probes(one, limit=_TRIED)
+    changed = [r for r in rows if evaluate(one, r).rule != evaluate(two, r).rule]
     if changed:
         return f"; another rule wins in {len(changed)} of {len(rows)} generated rows"
     return f"; the same rule wins in all of {len(rows)} generated rows"
@@ -561,15 +567,6 @@ def in_dialect(
     is_known = "dialect" in inspect.signature(form.write).parameters
     is_same = name == form.name and is_known
     return {"dialect": dialect, **options} if is_same else {**options}
-
-
-def _certified(model: Model, form: Format, dtype: object) -> Proof:
-    from fuzzytree.numerics import certify
-
-    wanted = [name for name in get_args(Dtype) if name == dtype]
-    known = wanted or [name for name in get_args(Dtype) if name == form.dtype]
-    certificate = certify(model, known[0], None)
-    return Proof("certified", certificate.sentence, certificate)
 
 
 def _run(system: FuzzySystem, written: Written) -> Proof:
@@ -591,15 +588,6 @@ def _run(system: FuzzySystem, written: Written) -> Proof:
         fired = coverage.rules - len(coverage.unfired)
         text += f", in which {fired} of {coverage.rules} rules fire"
     return Proof("alike", text, coverage=coverage)
-
-
-def _exact(model: Document, origin: str) -> Certificate | None:
-    """Return the certificate of a file with a deciding model, unchanged."""
-    if isinstance(model, FuzzySystem):
-        return None
-    from fuzzytree.numerics import Certificate
-
-    return Certificate(None, kind_of(model), 0.0, origin)
 
 
 def convert(

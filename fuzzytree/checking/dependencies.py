@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, cast, get_args
 
 import msgspec
 import numpy as np
@@ -19,9 +19,9 @@ from msgspec.structs import replace
 from fuzzytree.checking.comparing import (
     ModelRun,
     RowSet,
-    compare_bits,
+    compare,
     counted,
-    probed,
+    row_set,
 )
 from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.exporters import Contents, contents
@@ -53,6 +53,7 @@ from fuzzytree.semantics import (
     Removed,
     forms,
     free_axes,
+    probe_values,
     proof_faults,
     pruned,
     unguarded,
@@ -148,7 +149,6 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
     used = pruned(model, uses=uses, inputs=True).model
     left = pruned(model, uses=uses, inputs=True, rules=True)
     graphs, omissions = _graphs(model)
-    groups = model.sets if isinstance(model, FuzzyTree) else ()
     return Needs(
         model=model.name,
         fingerprint=fingerprint(model),
@@ -158,8 +158,8 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
         idle_inputs=tuple(n for n in model.inputs if n not in used.inputs),
         combinations=tuple(v.name for v in used.variables if v.parts),
         terms=sum(len(v.terms) for v in model.variables),
-        sets=sum(len(group.terms) for group in groups),
-        rules=len(model.leaves if isinstance(model, FuzzyTree) else model.rules),
+        sets=sum(len(group.terms) for group in model.sets),
+        rules=len(model.rule_labels),
         idle=left.removed,
         graphs=graphs,
         omissions=omissions,
@@ -184,7 +184,7 @@ def sizes_of(
     """
     for title, form in forms(model, uses).items():
         for dtype in get_args(Dtype):
-            if title == "tree" and dtype == "mixed":
+            if not form.rules and dtype == "mixed":
                 continue  # a path has comparisons alone: it is float64
             try:
                 yield title, dtype, _written(form, dtype, _USUAL)
@@ -207,7 +207,7 @@ def _graphs(model: Model) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
 def _explained(title: str, model: Model, whole: Contents) -> Graph:
     """Return a graph in double with what is in it for what."""
     more: tuple[Output, ...] = ("status",)
-    if isinstance(model, RuleBase):
+    if model.rules:
         more = ("status", "strengths")
     on_request = [
         _because(f"output {one}", _written(model, "float64", (*_USUAL, one)), whole)
@@ -219,8 +219,9 @@ def _explained(title: str, model: Model, whole: Contents) -> Graph:
     others: dict[str, Model] = {
         COMBINATIONS: free_axes(model) if has_combinations else model
     }
-    if isinstance(model, RuleBase):
-        others |= {what: without(model) for what, without in _FEATURES.items()}
+    if model.rules:
+        rules = cast("RuleBase", model)
+        others |= {what: without(rules) for what, without in _FEATURES.items()}
     for what, other in others.items():
         if other == model:
             left_out.append(what)
@@ -324,10 +325,10 @@ def prove(
     """
     whole, left = forms(model, uses), forms(remainder.model, uses)
     faults = [*proof_faults(model, remainder.model, uses=uses, rules=remainder.rules)]
-    size = len(model.nodes if isinstance(model, FuzzyTree) else model.rules)
+    size = len(model.rules or cast("FuzzyTree", model).nodes)
     proof = counted("proof", "pruned", "the model", size, faults)
     comparisons = [replace(proof, origin="equal operations on equal numbers")]
-    rows = probed(model, data, limit)
+    rows = row_set(model.inputs, probe_values(model, limit), data)
     for title, representation in whole.items():
         other = left.get(title)
         if other is None or not set(other.inputs) <= set(model.inputs):
@@ -377,7 +378,7 @@ def _compared(
         numbers = np.flatnonzero(chosen)
         if not is_by_design or numbers.size:
             one, two = (answers.part(numbers) for answers in pair)
-            compared = compare_bits(one, two, rows.part(numbers))
+            compared = compare(one, two, rows.part(numbers))
             if is_by_design and compared.differing:
                 compared = replace(compared, verdict="differs by design", detail=())
             yield compared
@@ -385,7 +386,7 @@ def _compared(
 
 def _in_old_numbers(outcome: Outcome, model: Model, numbers: Sequence[int]) -> Outcome:
     """Return an outcome as if the rules that are gone were there, with strength 0."""
-    if isinstance(model, FuzzyTree) or not numbers:
+    if not (model.rules and numbers):
         return outcome
     old = np.array([0, *numbers], np.int64)[outcome.rule]
     strengths = None

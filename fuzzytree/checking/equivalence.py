@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 from msgspec.structs import replace
 
@@ -15,7 +15,6 @@ from fuzzytree.model import (
     Curve,
     Document,
     FuzzySystem,
-    Model,
     Points,
     Proposition,
     Reading,
@@ -55,7 +54,7 @@ def is_equivalent(model: Document, other: Document) -> bool:
     return any(_mark(one) == mark for one in _stand_ins(model))
 
 
-def with_points_once(model: Model) -> Model:
+def with_points_once(model: Document) -> Document:
     """Return a model in which a point that stands twice stands once, as FLL has it."""
 
     def term(term: Term) -> Term:
@@ -68,8 +67,8 @@ def with_points_once(model: Model) -> Model:
 
 
 def _mark(model: Document) -> str:
-    if isinstance(model, FuzzySystem):
-        model = _settled(model)
+    if model.outputs:
+        model = _settled(cast("FuzzySystem", model))
     return fingerprint(canonical_form(model))
 
 
@@ -135,7 +134,7 @@ def _is_everywhere(curve: Curve) -> bool:
 def _stand_ins(model: Document) -> Iterator[Document]:
     """Yield what a file may hold in the place of a model, deciding alike."""
     yield model
-    if isinstance(model, RuleBase):
+    if model.rules and not model.outputs:
         for scores in get_args(Scores):
             with contextlib.suppress(LossError):
-                yield as_system(model, scores)
+                yield as_system(cast("RuleBase", model), scores)

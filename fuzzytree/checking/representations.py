@@ -9,25 +9,22 @@ however well aimed) and *calls* (ways of calling that break programs).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import cast
 
 import msgspec
 import numpy as np
 
 from fuzzytree.checking.comparing import (
     Finding,
+    ModelRun,
     RowSet,
     counted,
-    file_content,
-    judged,
+    differences,
 )
-from fuzzytree.checking.models import CheckedModel
-from fuzzytree.checking.programs import ProgramFile, check_program
-from fuzzytree.checking.systems import CheckedSystem
+from fuzzytree.checking.files import Shipped, check_file
+from fuzzytree.checking.subject import Subject
 from fuzzytree.errors import FuzzyTreeError, LossError, ReadError
 from fuzzytree.model import (
-    MOST_PROBES,
-    MOST_SYSTEM_PROBES,
     TOLERANCE,
     Agreement,
     Comparison,
@@ -36,28 +33,24 @@ from fuzzytree.model import (
     FileContent,
     FloatArray,
     FuzzySystem,
-    FuzzyTree,
     Kind,
     Outcome,
     Progress,
     RuleBase,
+    Run,
     Runtime,
+    Unchecked,
     checkpoint,
     fingerprint,
     kind_of,
 )
 from fuzzytree.runtimes import (
-    OnnxModel,
     chosen_runtimes,
     is_installed,
     joined,
     needed_by,
 )
 from fuzzytree.semantics import Status, as_rules, as_system
-
-if TYPE_CHECKING:
-    Checked = CheckedModel | CheckedSystem
-    Shipped = Document | OnnxModel | ProgramFile
 
 
 def check(
@@ -106,14 +99,9 @@ def check(
         (title, _comparable(other, model, title))
         for title, other in zip(titles, others, strict=False)
     ]
-    subject: Checked
-    if isinstance(model, FuzzySystem):
-        subject = CheckedSystem(model, data, limit or MOST_SYSTEM_PROBES)
-    else:
-        subject = CheckedModel(model, data, limit or MOST_PROBES, terms)
-        subject.tolerance = tolerance
+    subject = Subject(model, data, limit, terms=terms, tolerance=tolerance)
     chosen = chosen_runtimes(runtimes)
-    steps = [(form, runtime) for form in subject.outcomes for runtime in chosen]
+    steps = [(form, runtime) for form in subject.forms for runtime in chosen]
     parts = len(steps) + len(files)
     findings = [*subject.own()]
     for number, (form, runtime) in enumerate(steps):
@@ -123,19 +111,26 @@ def check(
     for number, (title, other) in enumerate(files, len(steps)):
         if progress:
             progress(f"comparing {title}", number / parts)
-        findings += _shipped(subject, title, other, terms)
+        findings += check_file(subject, title, other)
+    unchecked = tuple(one for one in findings if isinstance(one, Unchecked))
+    skipped = (
+        one.sentence if isinstance(one, Unchecked) else one
+        for one in findings
+        if isinstance(one, str | Unchecked)
+    )
     return Agreement(
         model.name,
         fingerprint(model),
         tuple(one for one in findings if isinstance(one, Comparison)),
-        tuple(_count(title, outcome) for title, outcome in subject.outcomes.items()),
-        tuple(dict.fromkeys(one for one in findings if isinstance(one, str))),
+        tuple(_count(title, run.outcome) for title, run in subject.runs.items()),
+        tuple(dict.fromkeys(skipped)),
         subject.cells,
         subject.rows.probes,
         tuple(subject.certificates(chosen)),
         rows_only,
         subject.coverage,
         tuple(one for one in findings if isinstance(one, FileContent)),
+        unchecked,
     )
 
 
@@ -148,14 +143,13 @@ def _comparable(other: Shipped, model: Document, title: str) -> Shipped:
     Raises:
         ReadError: If nothing of that kind stands for it.
     """
-    is_system = isinstance(model, FuzzySystem)
-    if is_system and isinstance(other, FuzzyTree):
-        raise ReadError(f"{title}: is a tree, and is not compared with a fuzzy system")
-    if is_system and isinstance(other, RuleBase):
-        return as_system(other, "winner")
-    if is_system or not isinstance(other, FuzzySystem):
+    if not isinstance(other, Document) or bool(model.outputs) == bool(other.outputs):
         return other
-    rules = as_rules(other, None)
+    if model.outputs and not other.rules:
+        raise ReadError(f"{title}: is a tree, and is not compared with a fuzzy system")
+    if model.outputs:
+        return as_system(cast("RuleBase", other), "winner")
+    rules = as_rules(cast("FuzzySystem", other), None)
     if rules is None:
         raise ReadError(
             f"{title}: is a fuzzy system whose outputs are numbers, and is not "
@@ -164,40 +158,51 @@ def _comparable(other: Shipped, model: Document, title: str) -> Shipped:
     return rules
 
 
-def _in_runtime(subject: Checked, form: str, runtime: Runtime) -> Iterator[Finding]:
+def _in_runtime(subject: Subject, form: str, runtime: Runtime) -> Iterator[Finding]:
     """Run one form in a runtime that can, and compare it with the native one."""
-    title = subject.title(form, runtime)
-    if kind_of(subject.forms[form]) not in runtime.runs:
+    title, model = subject.title(form, runtime), subject.forms[form]
+    if kind_of(model) not in runtime.runs:
         return
     if not is_installed(runtime):
         yield f"{runtime.name} is not installed ({needed_by(runtime)})"
         return
     checkpoint()
     try:
-        run: Any = subject.load(form, runtime)
+        run = runtime.load(model)
     except LossError as error:
         yield f"{title}: {error}"
         return
     checkpoint()
-    share = subject.share(form) if runtime.is_slow else slice(None)
-    yield from subject.compared(form, runtime, run, share)
+    rows = subject.share(form) if runtime.is_slow else subject.rows
+    yield from subject.compared(form, runtime, run, rows)
     checkpoint()
-    yield _calls(title, subject, run, subject.rows.part(share))
+    yield _calls(title, subject, model, run, rows)
 
 
-def _calls(title: str, subject: Checked, run: Any, rows: RowSet) -> Comparison:
-    """Call a runtime in the ways that break: no row, one, other order, wrong width."""
+def _calls(
+    title: str, subject: Subject, model: Document, run: Run, rows: RowSet
+) -> Comparison:
+    """Call a runtime in the ways that break: no row, one, other order, wrong width.
+
+    A library may compute a function of one number otherwise than of many, so that the
+    answers to a row may be apart as far as those of two runners.
+    """
     width, total = rows.values.shape
     rows = rows.part(slice(None, None, max(total // 24, 1)))
     sample = np.ascontiguousarray(rows.values)
-    count = sample.shape[1]
-    whole = run(sample)
+    whole, count = run(sample), sample.shape[1]
+
+    def wrong_rows(outcome: Outcome) -> list[str]:
+        one, two = (ModelRun(title, model, each) for each in (outcome, whole))
+        apart = differences(one, two, rows, subject.exactly(model))
+        return [rows.name(row) for row in apart.results.rows[apart.wrong].tolist()]
+
     alone = joined([run(sample[:, row : row + 1]) for row in range(count)])
     faults = [
         f"a row answered alone differs from the same row in a batch, {text}"
-        for text in subject.faults(alone, whole, rows)
+        for text in wrong_rows(alone)
     ]
-    if subject.faults(run(np.asfortranarray(sample)), whole, rows):
+    if wrong_rows(run(np.asfortranarray(sample))):
         faults.append("another memory order changes the answers")
     empty = run(np.empty((width, 0)))
     arrays = [array for array in msgspec.structs.astuple(empty) if array is not None]
@@ -209,45 +214,6 @@ def _calls(title: str, subject: Checked, run: Any, rows: RowSet) -> Comparison:
     except (ValueError, FuzzyTreeError):
         pass
     return counted("calls", title, "itself", count + 3, faults)
-
-
-def _shipped(
-    subject: Checked, title: str, other: Shipped, terms: Kind
-) -> Iterator[Finding]:
-    """Compare a file that was shipped beside a model: its content, then its answers."""
-    if isinstance(other, ProgramFile):
-        yield from check_program(title, other, subject.model, subject.rows, terms)
-    elif isinstance(other, OnnxModel):
-        yield from _shipped_onnx(subject, title, other)
-    else:
-        yield file_content(title, other)
-        yield from subject.shipped(title, other)
-
-
-def _shipped_onnx(subject: Checked, title: str, file: OnnxModel) -> Iterator[Finding]:
-    """Compare an ONNX file: what it says of itself, its graph, and its answers."""
-    forms = {"descent": "tree", "relative": "relative rules", "raw": "raw rules"}
-    yield FileContent(title, forms.get(file.kind, file.kind), file.dtype)
-    fault = subject.foreign(file)
-    if fault is not None:
-        yield counted("file", title, f"{subject.noun}'s facts", 1, (fault,))
-        return
-    from fuzzytree.exporters import differences
-
-    expected = subject.counterpart(file)
-    if isinstance(expected, str):
-        faults: Sequence[str] = (expected,)
-    else:
-        apart = differences(file.content, expected)
-        faults = apart.graph
-        yield counted("file", title, f"{subject.noun}'s metadata", 1, apart.metadata)
-    try:
-        results = [*subject.file_rows(title, file)]
-    except LossError as error:  # the file loads, but onnxruntime cannot run it
-        size = len(subject.rows.numbers)
-        results = [counted("rows", title, subject.base, size, (str(error),))]
-    yield judged(title, "a freshly written graph", faults, results)
-    yield from results
 
 
 def _count(title: str, outcome: Outcome) -> Count:

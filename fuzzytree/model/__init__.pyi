@@ -10,6 +10,7 @@ from .agreement import Comparison as Comparison
 from .agreement import Count as Count
 from .agreement import Coverage as Coverage
 from .agreement import FileContent as FileContent
+from .agreement import Unchecked as Unchecked
 from .agreement import Verdict as Verdict
 from .agreement import version as version
 from .algebra import N as N

@@ -176,6 +176,23 @@ class FileContent(msgspec.Struct, frozen=True):
     dtype: str
 
 
+class Unchecked(msgspec.Struct, frozen=True):
+    """A file whose answers were not compared, though its content was.
+
+    Attributes:
+        file: What the file is called.
+        reason: Why.
+    """
+
+    file: str
+    reason: str
+
+    @property
+    def sentence(self) -> str:
+        """The same for people."""
+        return f"{self.file}: its answers: {self.reason}"
+
+
 class CheckSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How far a check goes.
 
@@ -213,6 +230,7 @@ class Agreement(msgspec.Struct, frozen=True):
         rows_only: Whether the verdict `rows only` is accepted.
         coverage: Of a fuzzy system: which rules probes fire, and what is uncovered.
         files: What each file holds.
+        unchecked: The files whose answers were not compared; also in `skipped`.
     """
 
     FORMAT: ClassVar[str] = "fuzzytree-check/1"
@@ -228,6 +246,7 @@ class Agreement(msgspec.Struct, frozen=True):
     rows_only: bool = False
     coverage: Coverage | None = None
     files: tuple[FileContent, ...] = ()
+    unchecked: tuple[Unchecked, ...] = ()
 
     @property
     def ok(self) -> bool:

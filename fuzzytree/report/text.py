@@ -210,6 +210,14 @@ def agreement_verdict(agreement: Agreement) -> str:
     if rows_only:
         said += f"; in {counted(rows_only, 'file')} only the rows agree"
         said += "" if agreement.rows_only else ", which --rows-only accepts"
+    missed = {one.file for one in agreement.unchecked}
+    if missed:
+        faulty = {one.representation for one in agreement.wrong}
+        files = {one.file for one in agreement.files}
+        good = len(files - missed - faulty)
+        said += f"; {good} of {counted(len(files), 'file')} "
+        said += "agrees" if good == 1 else "agree"
+        said += f"; {len(missed)} not checked: {', '.join(sorted(missed))}"
     if broken:
         said += f"; {counted(broken, 'rounding bound')} exceeded"
     return said

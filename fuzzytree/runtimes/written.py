@@ -1,6 +1,6 @@
 """Written programs, each run by an engine of its language.
 
-A file runs as it is. `fuzzytree.checking.programs` compares its text first.
+A file runs as it is. `fuzzytree.checking.files` compares its text first.
 """
 
 from __future__ import annotations

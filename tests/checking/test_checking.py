@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.models import first_difference
+from fuzzytree.checking.files import first_difference
 from fuzzytree.checking.representations import check
 from fuzzytree.errors import DisagreementError
 from fuzzytree.model.agreement import Agreement

@@ -10,8 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.errors import MissingExtraError
-from fuzzytree.model.agreement import Agreement, FileContent
+from fuzzytree.model.agreement import Agreement, FileContent, Unchecked
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
     Band,
@@ -22,6 +21,7 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.report.text import agreement_lines
 from fuzzytree.runtimes import written
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.samples import all_samples
@@ -192,7 +192,7 @@ def test_a_changed_program_is_not_run(
     text = Path(path).read_text("utf-8")
     Path(path).write_text(text.replace("class 1", "class 2"), "utf-8")
     monkeypatch.setattr(
-        "fuzzytree.checking.programs.ENGINES", dict.fromkeys(written.ENGINES)
+        "fuzzytree.checking.files.ENGINES", dict.fromkeys(written.ENGINES)
     )
     agreement = checked(TREE, path)
     assert about(agreement, path) == [("a freshly written file", "DISAGREES")]
@@ -290,9 +290,9 @@ def test_a_program_that_fails_is_a_disagreement(
         (TREE, "m.js", {"module": "script"}, "only JavaScript modules are run"),
         (
             all_samples()["Mamdani, centroid"],
-            "m.c",
+            "m.st",
             {},
-            "programs of fuzzy systems in c are compared by their text",
+            "no engine for structured-text is known here",
         ),
     ],
 )
@@ -303,17 +303,119 @@ def test_a_program_without_an_engine_is_compared_by_its_text(
     agreement = checked(model, path)
     assert about(agreement, path) == [("a freshly written file", "agrees")]
     assert f"{path}: its answers: {why}" in agreement.skipped
+    assert agreement.unchecked == (Unchecked(path, why),)
     Path(path).write_bytes(Path(path).read_bytes() + b" ")
     assert about(checked(model, path), path) == [
         ("a freshly written file", "DISAGREES")
     ]
 
 
-def test_a_missing_engine_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_whose_engine_is_missing_is_not_checked_and_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     ft.save(TREE, "m.mjs")
+    ft.save(TREE, "m.yaml")
     monkeypatch.setattr("shutil.which", lambda _: None)
-    with pytest.raises(MissingExtraError) as caught:
-        checked(TREE, "m.mjs")
-    assert str(caught.value) == (
-        "m.mjs: running JavaScript needs node, which is not installed"
+    settings = ft.CheckSettings(limit=100)
+    agreement = ft.check(
+        TREE, "m.mjs", "m.yaml", runtimes=["native"], settings=settings
     )
+    reason = "running JavaScript needs node, which is not installed"
+    assert agreement.unchecked == (Unchecked("m.mjs", reason),)
+    assert f"m.mjs: its answers: {reason}" in agreement.skipped
+    assert next(agreement_lines(agreement)).startswith(
+        "random 6: none of 10 comparisons disagrees; 1 of 2 files agrees; 1 not "
+        "checked: m.mjs (100 generated rows"
+    )
+
+
+SYSTEMS = {
+    name: all_samples()[name]
+    for name in (
+        "Sugeno, linear",
+        "Mamdani, centroid",
+        "gaussian curves",
+        "several outputs",
+        "a default answer",
+        "inputs clamped to their range",
+    )
+}
+RUN: Sequence[Any] = (
+    ("m.c", {}),
+    ("m.c", {"activations": True, "name": "other"}),
+    ("m.mjs", {}),
+    ("m.py", {}),
+    ("m.sql", {}),
+    ("m.sql", {"dialect": "duckdb", "strengths": True}),
+    pytest.param("m.pmml", {}, marks=pytest.mark.heavy),
+)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize(("path", "options"), RUN)
+def test_a_program_of_a_system_is_run_and_agrees(
+    path: str, options: dict[str, Any], name: str
+) -> None:
+    system = SYSTEMS[name]
+    ft.save(system, path, **options)
+    agreement = checked(system, path)
+    assert about(agreement, path) == [
+        ("a freshly written file", "agrees"),
+        ("native", "agrees"),
+    ]
+    assert agreement.unchecked == ()
+
+
+@pytest.mark.parametrize(
+    ("path", "right", "wrong", "fault"),
+    [
+        ("m.c", "v0 - 0x1p+2 /* 4.0 */", "v0 - 4.0000001", "output 'fan'"),
+        ("m.c", "v27 + 0x1p+0", "v27 + 0x1.0000000000001p+0", "output 'fan'"),
+        ("m.mjs", "6.0 - v0", "6.0000001 - v0", "output 'fan'"),
+        ("m.mjs", "v44, //", "v42, //", "output 'fan'"),
+        ("m.mjs", "v48 ? 2.0", "v48 ? 1.0", "status tie where uncovered is right"),
+        ("m.mjs", "v46, //", "v45, //", "activation of rule 2"),
+        ("m.py", "6.0 - v0", "6.0000001 - v0", "output 'fan'"),
+        ("m.sql", "6e0 - x_1", "6.0000001e0 - x_1", "output 'fan'"),
+        ("m.sql", "ELSE 3e0 END", "ELSE 2e0 END", "status uncovered where missing"),
+        pytest.param(
+            "m.pmml", ">0.5<", ">0.50000001<", "output 'fan'", marks=pytest.mark.heavy
+        ),
+    ],
+)
+def test_a_wrong_number_in_a_program_of_a_system_is_noticed(
+    path: str, right: str, wrong: str, fault: str
+) -> None:
+    system = SYSTEMS["Sugeno, linear"]
+    ft.save(system, path)
+    text = Path(path).read_text("utf-8")
+    assert right in text
+    Path(path).write_text(text.replace(right, wrong), "utf-8")
+    agreement = checked(system, path, run_code=True)
+    assert about(agreement, path) == [
+        ("a freshly written file", "DISAGREES"),
+        ("native", "DISAGREES"),
+    ]
+    (rows,) = (
+        c
+        for c in agreement.comparisons
+        if (c.representation, c.basis) == (path, "rows")
+    )
+    assert fault in " ".join(rows.detail)
+
+
+def test_a_slow_program_says_how_many_rows_it_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("fuzzytree.checking.files._MOST_ROWS", 150)
+    ft.save(TREE, "m.py")
+    ft.save(TREE, "m.c")
+    settings = ft.CheckSettings(limit=300)
+    agreement = ft.check(TREE, "m.py", "m.c", runtimes=["native"], settings=settings)
+    assert "m.py: 150 of 300 rows; 150 others were run" in agreement.skipped
+    rows = {
+        c.representation: c.rows
+        for c in agreement.comparisons
+        if c.basis == "rows" and c.against == "the model"
+    }
+    assert rows == {"m.py": 150, "m.c": 300}

@@ -1,12 +1,13 @@
 """The check of systems: what it compares, and what it says of what is wrong."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking import systems as checking_systems
+from fuzzytree.checking import subject as checking_subject
 from fuzzytree.checking.representations import check
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.model import (
@@ -15,8 +16,11 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
+    Outcome,
     Proposition,
     RuleBlock,
+    Run,
+    Runtime,
     Singleton,
     SystemOutput,
     SystemRule,
@@ -25,7 +29,9 @@ from fuzzytree.model import (
 )
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import Points
+from fuzzytree.runtimes import run_system
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_system
 
 
@@ -166,9 +172,9 @@ def test_a_file_without_status_is_compared_by_its_numbers() -> None:
 def test_a_slow_runtime_gets_a_share_of_the_rows(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(checking_systems, "_SLOW_STEPS", 100)
+    monkeypatch.setattr(checking_subject, "_SLOW_STEPS", 100)
     agreement = check(washer(), limit=400, runtimes=["native"])
-    assert agreement.comparisons[0].rows < 50
+    assert agreement.comparisons[0].rows == 50
 
 
 def shifted(system: FuzzySystem, by: float) -> FuzzySystem:
@@ -207,14 +213,13 @@ def test_rows_on_an_edge_are_counted_beside_the_table() -> None:
     agreement = check(
         system, other, limit=1, data=np.array([[1.0, 0.5]]), runtimes=["native"]
     )
-    (result,) = (text for text in agreement.skipped if text.startswith("file 1"))
-    assert "in 1 of 3 rows last bits decide" in result
-    rows = [
+    (rows,) = (
         c
         for c in agreement.comparisons
         if (c.representation, c.basis) == ("file 1", "rows")
-    ]
-    assert [c.allowed < 1e-12 for c in rows] == [True]
+    )
+    assert (rows.rows, rows.unbounded) == (3, 1)
+    assert rows.allowed < 1e-12
 
 
 def test_a_check_reports_what_it_compares_next_and_how_far_it_is() -> None:
@@ -228,3 +233,51 @@ def test_a_check_reports_what_it_compares_next_and_how_far_it_is() -> None:
         progress=lambda text, share: parts.append((text, share)),
     )
     assert parts == [("comparing native", 0.0), ("comparing file 1", 0.5)]
+
+
+def moved_outputs(outcome: Outcome) -> Outcome:
+    assert outcome.outputs is not None
+    return replace(outcome, outputs=outcome.outputs * (1.0 + 1e-12))
+
+
+def last_status(outcome: Outcome) -> Outcome:
+    status = outcome.status.copy()
+    status[-1:] = 1
+    return replace(outcome, status=status)
+
+
+def swapped_activations(outcome: Outcome) -> Outcome:
+    assert outcome.strengths is not None
+    return replace(outcome, strengths=outcome.strengths[::-1])
+
+
+def one_rule_less(outcome: Outcome) -> Outcome:
+    assert outcome.strengths is not None
+    return replace(outcome, strengths=outcome.strengths[1:])
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (moved_outputs, "output 'fan'"),
+        (last_status, "status tie where"),
+        (swapped_activations, "activation of rule"),
+        (one_rule_less, "activation of rule"),
+    ],
+)
+def test_a_runtime_of_systems_that_gives_other_results_is_found(
+    change: Callable[[Outcome], Outcome],
+    fault: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def load(model: FuzzySystem, *, with_strengths: bool = True) -> Run:
+        run = run_system(model, with_strengths=with_strengths)
+        return lambda values: change(run(values))
+
+    liar = Runtime("liar", ("system",), load)
+    monkeypatch.setattr("fuzzytree.runtimes.table.find_runtime", lambda name: liar)
+    system = all_samples()["Mamdani, centroid"]
+    agreement = check(system, limit=200, runtimes=["liar"])
+    one = about(agreement, "liar", "rows")
+    assert one.verdict == "DISAGREES"
+    assert fault in " ".join(one.detail)

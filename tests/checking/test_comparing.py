@@ -3,15 +3,16 @@ import math
 import numpy as np
 import pytest
 
+from fuzzytree.checking.certificates import compare_exact
 from fuzzytree.checking.comparing import (
+    Allow,
     ModelRun,
     RowSet,
-    compare_answers,
-    compare_bits,
-    compare_exact,
-    compare_within,
+    compare,
+    excused,
     labels,
     margins,
+    within,
 )
 from fuzzytree.model.agreement import Certified
 from fuzzytree.model.contracts import Dtype, Outcome
@@ -54,20 +55,25 @@ BASE = answers(
 )
 
 
+def allowed(*limits: float) -> Allow:
+    """Allow a difference of strengths in each of `ROWS`."""
+    known = dict(zip(ROWS.values[0].tolist(), limits, strict=True))
+    return within(lambda values: (np.array([known[x] for x in values[0]]), "test"))
+
+
 def test_equal_answers_of_other_strengths_name_the_rule_that_differs() -> None:
     assert BASE.outcome.strengths is not None
     strengths = BASE.outcome.strengths.tolist()
     strengths[2][1] = 0.125
     moved = answers("moved", [1, 2, 0], [0, 0, 2], strengths)
-    assert compare_bits(moved, BASE, ROWS).detail == (
+    assert compare(moved, BASE, ROWS).detail == (
         "only strengths differ: every row has the same class",
-        "row 1: x 2.0: both answer b (rule 2) with 0.4; the strength of rule 3 is "
-        "0.1 in base, 0.125 in moved",
+        "row 1: x 2.0: strength of rule 3 0.125 where 0.1 is right",
     )
 
 
 def test_equal_answers_agree() -> None:
-    result = compare_bits(BASE, BASE, ROWS)
+    result = compare(BASE, BASE, ROWS)
     assert (result.verdict, result.differing, result.flips) == ("agrees", 0, 0)
 
 
@@ -78,13 +84,13 @@ def test_one_ulp_of_a_strength_disagrees_with_equal_bits() -> None:
         [0, 0, 2],
         [[math.nextafter(0.9, 1), 0.2, 0.0], [0.5, 0.4, 0.0], [0.8, 0.1, 0.0]],
     )
-    result = compare_bits(moved, BASE, ROWS)
+    result = compare(moved, BASE, ROWS)
     assert (result.verdict, result.differing) == ("DISAGREES", 1)
     assert result.largest_difference == math.nextafter(0.9, 1) - 0.9
     assert result.detail == (
         "only strengths differ: every row has the same class",
-        "generated row 1: x 1.0: base answers a (rule 1) with 0.9, "
-        "moved a (rule 1) with 0.9000000000000001",
+        "generated row 1: x 1.0: strength of rule 1 0.9000000000000001 where 0.9 is "
+        "right",
     )
 
 
@@ -95,23 +101,22 @@ def test_a_zero_of_the_other_sign_disagrees_with_equal_bits() -> None:
         [0, 0, 2],
         [[0.9, 0.2, 0.0], [0.5, 0.4, -0.0], [0.8, 0.1, 0.0]],
     )
-    result = compare_bits(signed, BASE, ROWS)
+    result = compare(signed, BASE, ROWS)
     assert (result.verdict, result.differing) == ("DISAGREES", 1)
     assert result.detail == (
-        "row 2: x 3.0: both answer b (uncovered); the strength of rule 2 is 0.0 in "
-        "base, -0.0 in signed",
+        "row 2: x 3.0: strength of rule 2 -0.0 where 0.0 is right",
     )
 
 
 def test_another_rule_of_the_same_class_disagrees_with_equal_bits() -> None:
     other = answers("other", [3, 2, 0], [0, 0, 2], [[0.9, 0.2, 0.0]] * 3)
-    assert compare_bits(other, BASE, ROWS).verdict == "DISAGREES"
+    assert compare(other, BASE, ROWS).verdict == "DISAGREES"
 
 
 def test_nan_equals_nan_and_nothing_else() -> None:
     nothing = answers("nothing", [0, 0, 0], [3, 3, 3], [[math.nan] * 3] * 3)
-    assert compare_bits(nothing, nothing, ROWS).verdict == "agrees"
-    assert compare_bits(nothing, BASE, ROWS).largest_difference == math.inf
+    assert compare(nothing, nothing, ROWS).verdict == "agrees"
+    assert compare(nothing, BASE, ROWS).largest_difference == math.inf
 
 
 def test_classes_may_differ_only_within_twice_the_bound() -> None:
@@ -123,12 +128,10 @@ def test_classes_may_differ_only_within_twice_the_bound() -> None:
         [0, 0, 2],
         [[0.9, 0.3, 0.0], [0.5, 0.3, 0.0], [0.8, 0.1, 0.0]],
     )
-    wide = compare_within(flipped, BASE, ROWS, allowed=np.full(3, 0.11), origin="test")
+    wide = compare(flipped, BASE, ROWS, allowed(0.11, 0.11, 0.11))
     assert (wide.verdict, wide.flips) == ("agrees", 1)
     assert wide.largest_flip_margin == 0.4 - 0.2
-    narrow = compare_within(
-        flipped, BASE, ROWS, allowed=np.full(3, 0.09), origin="test"
-    )
+    narrow = compare(flipped, BASE, ROWS, allowed(0.09, 0.09, 0.09))
     assert (narrow.verdict, narrow.differing) == ("DISAGREES", 1)
 
 
@@ -140,8 +143,7 @@ def test_the_allowed_difference_is_that_of_the_row_with_the_largest_one() -> Non
         [[0.90625, 0.2, 0.0], [0.5, 0.40625, 0.0], [0.8, 0.1, 0.5]],
     )
     moved.outcome.strengths[0, 1] = 0.25  # type: ignore[index]  # it has strengths
-    allowed = np.array([0.00625000001, 0.2, 1.0])
-    result = compare_within(moved, BASE, ROWS, allowed=allowed, origin="test")
+    result = compare(moved, BASE, ROWS, allowed(0.00625000001, 0.2, 1.0))
     assert result.verdict == "agrees"
     assert (result.largest_difference, result.allowed) == (0.25 - 0.2, 0.2)
     assert (result.unbounded, result.largest_unbounded) == (1, 0.5)
@@ -149,24 +151,39 @@ def test_the_allowed_difference_is_that_of_the_row_with_the_largest_one() -> Non
 
 def test_a_difference_by_design_is_reported_and_no_fault() -> None:
     other = answers("other", [2, 2, 0], [0, 0, 2], [[0.9, 0.2, 0.0]] * 3)
-    result = compare_answers(other, BASE, ROWS, by_design=True)
+    result = compare(other, BASE, ROWS, kinds=("class",), by_design=True)
     assert (result.verdict, result.flips) == ("differs by design", 1)
-    assert compare_answers(other, BASE, ROWS).verdict == "DISAGREES"
+    assert compare(other, BASE, ROWS, kinds=("class",)).verdict == "DISAGREES"
+
+
+def test_another_rule_needs_two_rules_that_are_near() -> None:
+    # Row 1: rule 1 leads rule 3 of its class by 0.1.
+    strengths = BASE.outcome.strengths
+    assert strengths is not None
+    other = answers("other", [3, 2, 0], [0, 0, 2], strengths.tolist())
+    assert compare(other, BASE, ROWS, allowed(0.051, 0, 0)).verdict == "agrees"
+    narrow = compare(other, BASE, ROWS, allowed(0.049, 0, 0))
+    assert narrow.detail == ("generated row 1: x 1.0: rule 3 where 1 is right",)
+
+
+def test_one_rule_more_disagrees_in_every_row() -> None:
+    strengths = BASE.outcome.strengths
+    assert strengths is not None
+    more = answers("more", [1, 2, 0], [0, 0, 2], [*strengths.tolist(), [0.0] * 3])
+    assert compare(more, BASE, ROWS).differing == 3
+    assert compare(BASE, more, ROWS).differing == 3
 
 
 def test_an_excused_row_may_differ_and_no_other() -> None:
     strengths = BASE.outcome.strengths
     assert strengths is not None
     other = answers("other", [2, 2, 0], [0, 0, 2], strengths.tolist())
-    first = np.array([True, False, False])
-    last = np.array([False, False, True])
-    origin = "test"
-    assert compare_bits(other, BASE, ROWS, excused=first, origin=origin).verdict == (
-        "agrees"
-    )
-    assert compare_bits(other, BASE, ROWS, excused=last, origin=origin).verdict == (
-        "DISAGREES"
-    )
+    first = excused(lambda values: values[0] == 1.0, "test")
+    last = excused(lambda values: values[0] == 3.0, "test")
+    result = compare(other, BASE, ROWS, first)
+    assert (result.verdict, result.flips) == ("agrees", 1)
+    assert result.origin == "test; equal bits in 2 rows"
+    assert compare(other, BASE, ROWS, last).verdict == "DISAGREES"
 
 
 def test_labels_follow_the_rule_or_the_declared_answer() -> None:

@@ -286,7 +286,7 @@ def test_no_command_comes_next_that_compares_numbers_with_classes(call: Call) ->
         assert "next" not in err
     code, out, _ = call("check", "grip.yaml", "a.onnx", "--runtime", "native")
     assert code == 1
-    assert "  it answers the numbers of a fuzzy system, and the model a class\n" in out
+    assert "  it computes class from force, slip, which are not the model's\n" in out
 
 
 def test_a_terminal_is_no_input(

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from fuzzytree.checking.comparing import ModelRun, compare_bits, probed
-from fuzzytree.checking.programs import ProgramFile, check_program
+from fuzzytree.checking.comparing import ModelRun, compare, row_set
+from fuzzytree.checking.files import ProgramFile, check_program
+from fuzzytree.checking.subject import Subject
 from fuzzytree.exporters import c, javascript, pmml, sql
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.model.agreement import Comparison
@@ -84,16 +85,16 @@ def test_onnxruntime_mixes_what_the_native_runtime_mixes(
 @SEEDS
 def test_a_comparison_finds_other_probabilities(seed: int) -> None:
     rules = rules_of(seed)
-    rows = probed(rules, None, 50)
+    rows = row_set(rules.inputs, probe_values(rules, 50), None)
     base = ModelRun("native", rules, native.load(rules)(rows.values))
     run = prepare(rules, probabilities=True).run
     found = ModelRun("onnx", rules, run(rows.values))
-    assert compare_bits(found, base, rows).verdict == "agrees"
+    assert compare(found, base, rows).verdict == "agrees"
     other = rated(rules, seed + 10)
     wrong = ModelRun("onnx", rules, prepare(other, probabilities=True).run(rows.values))
-    result = compare_bits(wrong, base, rows)
+    result = compare(wrong, base, rows)
     assert result.verdict == "DISAGREES"
-    assert any("with other probabilities" in one for one in result.detail)
+    assert any("probability of " in one for one in result.detail)
 
 
 @SEEDS
@@ -213,16 +214,14 @@ def test_check_runs_programs_with_probabilities(
         pytest.importorskip("jpmml_evaluator")
     rules = rules_of(1)
     content = write(rules, probabilities=True, **options).content
-    rows = probed(rules, None, 40)
-    found = [*check_program("it", ProgramFile(name, content), rules, rows, "relative")]
+    subject = Subject(rules, None, 40, terms="relative", tolerance=1e-6)
+    found = [*check_program(subject, "it", ProgramFile(name, content))]
     assert [one.verdict for one in found if isinstance(one, Comparison)][:2] == [
         "agrees",
         "agrees",
     ]
     other = write(rated(rules, 9), probabilities=True, **options).content
-    wrong = [
-        *check_program("it", ProgramFile(name, other, True), rules, rows, "relative")
-    ]
+    wrong = [*check_program(subject, "it", ProgramFile(name, other, True))]
     verdicts = [one.verdict for one in wrong if isinstance(one, Comparison)]
     assert verdicts[0] in ("DISAGREES", "rows only")
     if name in ("javascript", "sql"):

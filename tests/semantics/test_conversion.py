@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from fuzzytree.checking import export
 from fuzzytree.checking.converting import read_content
-from fuzzytree.checking.models import first_difference
+from fuzzytree.checking.files import first_difference
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import (

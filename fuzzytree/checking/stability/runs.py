@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.comparing import ModelRun, exact_errors, same_bits, unequal
+from fuzzytree.checking.certificates import exact_errors
+from fuzzytree.checking.comparing import ModelRun, same_bits, unequal
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
     BoolArray,

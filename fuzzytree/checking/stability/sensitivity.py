@@ -133,10 +133,7 @@ def _move(
         moves[~is_number[0] & ~is_number[1]] = 0.0
         changed = ~(moves <= SAFE).all(axis=0)
     else:
-        first, second = (
-            labels(ModelRun("", model, one))  # type: ignore[arg-type] # has classes
-            for one in (before, after)
-        )
+        first, second = (labels(ModelRun("", model, one)) for one in (before, after))
         moves, changed = strength_gap(after, before)[np.newaxis], first != second
     moves = np.nan_to_num(moves, nan=1.0, posinf=1.0)  # a number comes or goes
     largest = moves.max(axis=0, initial=0.0)
