@@ -191,12 +191,6 @@ def test_streams_name_their_formats(call: Call) -> None:
             for text in ("0.0", "-1.0", "2.0", "nan", "inf")
         ),
         (
-            ("tipper.fll", "a.py"),
-            "cannot write tipper as python: it carries tree or rules, "
-            "and this is a fuzzy system whose outputs are numbers; "
-            f"{', '.join(SYSTEMS)} carry one\n",
-        ),
-        (
             ("tipper.fll", "a.yaml", "--as", "rules"),
             "--as rules: tipper is a fuzzy system whose outputs are numbers, "
             "and no rules that decide for a class can be made of it" + HELP,
@@ -572,9 +566,9 @@ tip, 0 to 30
 
 
 def test_an_old_file_survives_a_conversion_that_fails(call: Call) -> None:
-    Path("a.py").write_text("old", "utf-8")
-    assert call("convert", "tipper.fll", "a.py")[0] == 2
-    assert Path("a.py").read_text("utf-8") == "old"
+    Path("a.fcl").write_text("old", "utf-8")
+    assert call("convert", "tipper.fll", "a.fcl")[0] == 1
+    assert Path("a.fcl").read_text("utf-8") == "old"
     assert not list(Path.cwd().glob(".*.part"))
 
 
