@@ -297,26 +297,27 @@ def _model_proto(
         "outputs": (degree, ["rows", len(model.outputs)]),
     }
     facts = _facts(model, dtype, columns, outputs)
-    if readable or isinstance(model, FuzzySystem):
-        program = program_of(
-            model,
-            with_strengths="activations" in outputs,
-            with_probabilities="probabilities" in outputs,
-        )
-        program_graph(graph, program, columns, outputs, model.classes)
-        if isinstance(model, FuzzySystem):
-            facts["chunk"] = str(rows_at_once(model, program))
-        else:
-            facts["form"] = "readable"
-    else:
-        onnx_ends.fill_inputs(graph, model, columns)
-        if isinstance(model, FuzzyTree):
+    match model:
+        case FuzzyTree() if not readable:
+            onnx_ends.fill_inputs(graph, model, columns)
             is_plain = plain or needs_plain(model)
             frame = tree_graph(graph, model, columns, is_plain=is_plain)
             onnx_ends.add_tree_outputs(graph, model, frame, outputs)
-        else:
+        case RuleBase() if not readable:
+            onnx_ends.fill_inputs(graph, model, columns)
             frame, strengths = rules_graph(graph, model, columns)
             onnx_ends.add_rule_outputs(graph, model, frame, strengths, outputs)
+        case _:
+            program = program_of(
+                model,
+                with_strengths="activations" in outputs,
+                with_probabilities="probabilities" in outputs,
+            )
+            program_graph(graph, program, columns, outputs, model.classes)
+            if model.outputs:
+                facts["chunk"] = str(rows_at_once(model, program))
+            else:
+                facts["form"] = "readable"
     return model_proto(
         graph,
         facts["carrier"],

@@ -26,7 +26,7 @@ from fuzzytree.exporters.onnx_graph import (
     identifier,
     np_to_onnx,
 )
-from fuzzytree.model import FuzzySystem
+from fuzzytree.model import Document
 from fuzzytree.numerics import RealArray, RealKind, rounded
 from fuzzytree.semantics import (
     BELOW_ONE,
@@ -621,13 +621,13 @@ def side_by_side(graph: OnnxGraph, names: Sequence[str], named: str) -> None:
     graph.node("Transpose", block, perm=[1, 0], named=named)
 
 
-def rows_at_once(system: FuzzySystem, program: Program) -> int:
+def rows_at_once(model: Document, program: Program) -> int:
     """Return how many rows are best run together, so that they stay in the cache."""
     samples = [
-        one.defuzzifier.samples
-        for one in system.outputs
-        if not one.defuzzifier.is_weighted
+        output.defuzzifier.samples
+        for output in model.outputs
+        if not output.defuzzifier.is_weighted
     ]
     if is_wide(program):
-        samples.append(len(system.rules))
+        samples.append(len(model.rules))
     return max(2**17 // max(samples, default=8), 64)

@@ -136,7 +136,7 @@ def write_python(model: Document, /, *, allow_loss: bool = False) -> Written:
     del allow_loss
     inputs = [variable for variable in model.variables if not variable.parts]
     got, wrong = "answer(given)[:3]", "got != expected"
-    if isinstance(model, FuzzySystem):
+    if model.outputs:
         got = "numbers(given)[: len(expected)]"
         wrong = "not all(map(is_near, got, expected, *bounds))"
     text = "".join(
@@ -158,7 +158,7 @@ def _heading(model: Document) -> Iterator[str]:
     yield "# -*- coding: utf-8 -*-\n"  # so that no name below can declare another
     yield f"# {title_of(model, repr(model.name))}. Written by fuzzytree.\n"
     yield f"# Fingerprint: {fingerprint(model)}\n"
-    if not isinstance(model, FuzzySystem):
+    if model.classes:
         yield f"# Classes: {', '.join(map(repr, model.classes))}\n"
     yield "\n"
 
@@ -435,9 +435,9 @@ def _doors(model: Document, inputs: Sequence[Variable]) -> Iterator[str]:
     takes = ", ".join(["*", *names]) if names else ""
     values = "".join(f"{n}, " for n in names).strip()
     doors = [("decide", "class, number of the rule and status", "[:3]")]
-    if isinstance(model, RuleBase):
+    if model.rules:
         doors.append(("strengths", "the strength of every rule", "[3]"))
-    if isinstance(model, FuzzySystem):
+    if model.outputs:
         doors = [("infer", "outputs, status and activations", "")]
     for name, what, part in doors:
         yield f"\n\ndef {name}({takes}):\n"

@@ -162,7 +162,7 @@ def _heading(model: Document, dialect: Dialect, source: str) -> Iterator[str]:
     yield f"-- Written by fuzzytree. Fingerprint: {source}"
     if dialect in TRANSLATED:
         yield f"-- Not executed by fuzzytree: {_UNTRIED}."
-    if isinstance(model, FuzzySystem):
+    if model.outputs:
         yield f"-- Outputs: {', '.join(repr(one.name) for one in model.outputs)}"
     else:
         yield f"-- Classes: {', '.join(map(repr, model.classes))}"
@@ -202,8 +202,8 @@ def _program(
     query: Query, model: Document, steps: SqlSteps, results: Sequence[Result]
 ) -> Iterator[str]:
     """Yield the queries of a program whose results are named after their kind."""
-    classes = () if isinstance(model, FuzzySystem) else model.classes
-    ends = [f"WHEN {k}e0 THEN {query.text(name)}" for k, name in enumerate(classes)]
+    classes = enumerate(model.classes)
+    ends = [f"WHEN {k}e0 THEN {query.text(name)}" for k, name in classes]
 
     def named() -> Iterator[tuple[str, str]]:
         counts: Counter[str] = Counter()
