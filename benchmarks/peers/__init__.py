@@ -22,10 +22,11 @@ from fuzzytree.benchmarking.records import (
     Omission,
     Question,
 )
-from fuzzytree.model.contracts import Dtype, Model
+from fuzzytree.model.contracts import Document, Dtype, Model
 from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
-from peers import engines, evaluator, trees
+from peers import engines, evaluator, systems, trees
 from peers.sampling import lines_bound
 
 _PYTHON = "one row after another"
@@ -97,17 +98,17 @@ _PACKAGES = {"sklearn": "scikit-learn", "fuzzylite": "--no-deps pyfuzzylite"}
 """What pip calls the modules that have another name there."""
 
 
-def _uncertified(rules: RuleBase, dtype: Dtype) -> None:
+def _uncertified(rules: Document, dtype: Dtype) -> None:
     """Certify nothing."""
 
 
 def peers(
-    model: Model, bounds: Bounds = _uncertified
+    model: Document, bounds: Bounds = _uncertified
 ) -> tuple[list[Candidate], list[Omission]]:
     """Return a candidate for each peer and each question that it can answer.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         bounds: Certifies the strengths of a rule base in a number type.
 
     Returns:
@@ -122,10 +123,13 @@ def peers(
     found: list[Candidate] = []
     omitted: dict[str, Omission] = {}
     for question, form in questions(model).items():
-        if isinstance(form, RuleBase):
-            made, left = _of_rules(form, question, bounds)
-        else:
-            made, left = _of_tree(form)
+        match form:
+            case RuleBase():
+                made, left = _of_rules(form, question, bounds)
+            case FuzzyTree():
+                made, left = _of_tree(form)
+            case FuzzySystem():
+                made, left = _of_system(form)
         for one in made:
             name = title(one.name, question)
             found.append(msgspec.structs.replace(one, name=name, question=question))
@@ -155,6 +159,24 @@ def _of_tree(tree: FuzzyTree) -> tuple[list[Candidate], list[Omission]]:
         )
         found.append(one)
     return _with_evaluator(tree, lambda: None, found, omitted)
+
+
+def _of_system(system: FuzzySystem) -> tuple[list[Candidate], list[Omission]]:
+    """Return the engines that read a system; the others take rule bases alone."""
+    elsewhere = "it reads no systems; benchmarks/engines.py builds some for it"
+    omitted = [Omission(name, elsewhere) for name in ("simpful", "scikit-fuzzy")]
+    why = _absent(("fuzzylite",))
+    if why:
+        return [], [Omission("pyfuzzylite", why), *omitted]
+    one = Candidate(
+        "pyfuzzylite",
+        "system",
+        "peer",
+        partial(systems.load_fuzzylite, system),
+        note="the system as FLL; rows with missing values are answered by us",
+        modules=("fuzzylite",),
+    )
+    return [one], omitted
 
 
 def _of_rules(

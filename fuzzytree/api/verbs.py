@@ -482,7 +482,7 @@ def bench(
         >>> [point.question for point in study.points]
         ['tree', 'relative rules', 'raw rules']
     """
-    first, path = _model_of(model, "bench"), path_of(data)
+    first, path = checking.as_model(model), path_of(data)
     return benchmarking.bench(
         first,
         values=rows_of(data, first),

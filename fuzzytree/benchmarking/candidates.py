@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.benchmarking.judging import MOST_ROWS
+from fuzzytree.benchmarking.judging import MOST_ROWS, output_bound
 from fuzzytree.benchmarking.records import (
     Bound,
     Candidate,
@@ -29,8 +29,9 @@ from fuzzytree.benchmarking.records import (
 from fuzzytree.errors import install_hint
 from fuzzytree.model import (
     LR,
+    Document,
     Dtype,
-    Model,
+    FuzzySystem,
     Outcome,
     Prepared,
     RuleBase,
@@ -46,8 +47,8 @@ if TYPE_CHECKING:
 
     from fuzzytree.model import FloatArray
 
-Bounds = Callable[[RuleBase, Dtype], Bound | None]
-"""The certified error of a rule base's strengths in a number type, if there is one."""
+Bounds = Callable[[Document, Dtype], Bound | None]
+"""The certified error of strengths or outputs in a number type, if there is one."""
 
 Candidates = tuple[list[Candidate], list[Omission]]
 """What can be measured, and what cannot be, each with its reason."""
@@ -57,7 +58,7 @@ _BLOCK = 1 << 16
 
 
 @functools.lru_cache(maxsize=1)
-def questions(model: Model) -> Mapping[Question, Model]:
+def questions(model: Document) -> Mapping[Question, Document]:
     """Return the questions that a model answers, each with its form.
 
     The raw rules of a large tree take seconds to make: so they are kept.
@@ -95,7 +96,7 @@ class Layouts:
         return self._tables[key]
 
 
-def own(model: Model, bounds: Bounds, layouts: Layouts) -> Candidates:
+def own(model: Document, bounds: Bounds, layouts: Layouts) -> Candidates:
     """Return a candidate for each runtime and each question that it can answer.
 
     `bounds` certifies the strengths of a rule base; sessions share their tables in
@@ -126,9 +127,9 @@ def own(model: Model, bounds: Bounds, layouts: Layouts) -> Candidates:
     return candidates, omitted
 
 
-def _bound(runtime: Runtime, model: Model, bounds: Bounds) -> Bound | None:
-    """Return a certified bound of the strengths that a runtime decides by."""
-    if not isinstance(model, RuleBase):
+def _bound(runtime: Runtime, model: Document, bounds: Bounds) -> Bound | None:
+    """Return a certified bound of what a runtime decides by, or answers."""
+    if not model.rules:
         return None
     certified = bounds(model, runtime.dtype)
     if runtime.bound is None or certified is None:
@@ -141,7 +142,7 @@ def _bound(runtime: Runtime, model: Model, bounds: Bounds) -> Bound | None:
 
 
 def load_runtime(
-    runtime: Runtime, model: Model, layouts: Layouts, threads: int
+    runtime: Runtime, model: Document, layouts: Layouts, threads: int
 ) -> LoadedCandidate:
     """Prepare a model in a runtime of the table.
 
@@ -156,13 +157,12 @@ def load_runtime(
             lambda values: partial(graph.call, layouts.table(values, graph)),
             len(graph.content),
         )
-    run = runtime.load(model)
-    block = _BLOCK
-    if isinstance(model, RuleBase):
-        block = max(1, min(_BLOCK, _BLOCK_NUMBERS // len(model.rules)))
+    run = runtime.load(model, with_strengths=not model.outputs)
+    fired = () if model.outputs else model.rules
+    block = max(1, min(_BLOCK, _BLOCK_NUMBERS // max(len(fired), 1)))
 
     def call(values: FloatArray) -> Callable[[], object]:
-        if not isinstance(model, RuleBase) or values.shape[1] <= block:
+        if not fired or values.shape[1] <= block:
             return partial(run, values)
         starts = range(0, values.shape[1], block)
         parts = [values[:, start : start + block] for start in starts]
@@ -178,13 +178,15 @@ def _each(run: Callable[[FloatArray], object], parts: Sequence[FloatArray]) -> N
 
 
 def _found(
-    run: Callable[[FloatArray], Outcome], model: Model, values: FloatArray
+    run: Callable[[FloatArray], Outcome], model: Document, values: FloatArray
 ) -> CandidateOutput:
     return found_of(run(np.ascontiguousarray(values)), model)
 
 
-def found_of(outcome: Outcome, model: Model) -> CandidateOutput:
-    """Return a runtime's outcome as class numbers and strengths."""
+def found_of(outcome: Outcome, model: Document) -> CandidateOutput:
+    """Return a runtime's outcome as class numbers and strengths, or as outputs."""
+    if isinstance(model, FuzzySystem):
+        return CandidateOutput(outcome.status, None, outcome.outputs)
     return CandidateOutput(predictions_of(outcome, model).codes, outcome.strengths)
 
 
@@ -258,7 +260,7 @@ _MOST_TERMS = 400  # their points take seconds
 Make = Callable[[RuleBase], ApproximateRules]
 
 
-def variants(model: Model, bounds: Bounds, layouts: Layouts) -> Candidates:
+def variants(model: Document, bounds: Bounds, layouts: Layouts) -> Candidates:
     """Return the variants of each rule base that a model gives.
 
     The arguments are those of `own`. A candidate's bound is known once it is loaded;
@@ -340,14 +342,14 @@ def _load(
     return replace(loaded, bound=bound)
 
 
-Peers = Callable[[Model, Bounds], Candidates]
+Peers = Callable[[Document, Bounds], Candidates]
 """Returns candidates of third-party libraries for a model."""
 
 _GROUPS = (*get_args(Question), *get_args(Kind))
 _MOST_DEGREES = 10_000_000  # whose errors are bounded in about a second
 
 
-def gather(model: Model, values: FloatArray, peers: str | None = None) -> Candidates:
+def gather(model: Document, values: FloatArray, peers: str | None = None) -> Candidates:
     """Return every candidate for a model, and what cannot be one.
 
     Certified bounds hold on the `values`, or on the first of them where the model is
@@ -462,7 +464,9 @@ def _bounds(values: FloatArray) -> Bounds:
     """
 
     @functools.cache
-    def bounds(rules: RuleBase, dtype: Dtype) -> Bound | None:
+    def bounds(rules: Document, dtype: Dtype) -> Bound | None:
+        if isinstance(rules, FuzzySystem):
+            return output_bound(rules, values)
         terms = sum(len(variable.terms) for variable in rules.variables)
         rows = max(_MOST_DEGREES // max(terms, 1), MOST_ROWS)
         certificate = certify(rules, dtype, values[:, :rows])

@@ -17,9 +17,25 @@ from fuzzytree.benchmarking.records import (
     LoadedCandidate,
     Question,
 )
-from fuzzytree.model import FloatArray, Model, RuleBase
+from fuzzytree.model import (
+    Document,
+    FloatArray,
+    FuzzySystem,
+    Model,
+    Outcome,
+    RuleBase,
+)
 from fuzzytree.numerics import Decisions, decide, strength_errors
-from fuzzytree.semantics import Status, landmarks, probe_values
+from fuzzytree.runtimes import definition
+from fuzzytree.semantics import (
+    ORIGIN,
+    Status,
+    error_bounds,
+    landmarks,
+    probe_values,
+    program_of,
+    shape_of,
+)
 
 MOST_ROWS = 2_000
 """Rows on which errors are observed, of those that are timed."""
@@ -29,6 +45,7 @@ MOST_PROBES = 500
 
 _PATIENCE_NS = 3e8  # for the answers of one candidate to one set of rows
 _BATCH = 1 << 15  # rows in which a call's own cost no longer counts
+_STEPS_OF_RULE = 10
 _MOST_STRENGTHS = 200_000  # for each candidate, in intervals: half a second or so
 
 
@@ -47,18 +64,18 @@ class CandidateJudgement(NamedTuple):
 
 
 class ExactSample(msgspec.Struct, frozen=True):
-    """Rows to judge on, and the exact answers to them."""
+    """Rows to judge on, and the exact answers to them: a system's, or classes."""
 
-    model: Model
+    model: Document
     values: FloatArray
-    exact: Decisions
+    exact: Decisions | Outcome
 
 
 class CandidateJudge:
     """Compares predictions with the exact ones, on rows that are made once."""
 
     def __init__(
-        self, forms: Mapping[Question, Model], values: FloatArray, clock: TimeSource
+        self, forms: Mapping[Question, Document], values: FloatArray, clock: TimeSource
     ) -> None:
         self.forms, self.clock = forms, clock
         most = min(map(_most_rows, forms.values()))
@@ -110,10 +127,68 @@ class CandidateJudge:
             model = self.forms[question]
             edges = probe_values(model, min(MOST_PROBES, _most_rows(model)))
             self.samples[question] = (
-                ExactSample(model, self.values, decide(model, self.values)),
-                ExactSample(model, edges, decide(model, edges)),
+                _exact_sample(model, self.values),
+                _exact_sample(model, edges),
             )
         return self.samples[question]
+
+
+def _exact_sample(model: Document, values: FloatArray) -> ExactSample:
+    """Return rows with exact answers; those of a fuzzy system are the definition's."""
+    if isinstance(model, FuzzySystem):
+        exact = definition().load(model, with_strengths=False)(values)
+        return ExactSample(model, values, exact)
+    return ExactSample(model, values, decide(model, values))
+
+
+def output_bound(system: FuzzySystem, values: FloatArray) -> tuple[float, str] | None:
+    """Return how far outputs can be from the definition's, as a share of their range.
+
+    It holds on the rows that candidates are judged on, of `values` of shape (inputs,
+    rows); None where last bits decide on one of them.
+    """
+    rows = np.ascontiguousarray(values[:, : _most_rows(system)])
+    program = program_of(system, with_strengths=False)
+    allowed = error_bounds(program, rows)[: len(system.outputs)]
+    shares = allowed.max(axis=1, initial=0.0) / _spans(system)
+    largest = float(shares.max(initial=0.0))
+    return (largest, ORIGIN) if math.isfinite(largest) else None
+
+
+def _spans(system: FuzzySystem) -> FloatArray:
+    """Return the width of each output's range; 1 where it declares none."""
+    pairs = [(output.low, output.high) for output in system.outputs]
+    spans = [1.0 if a is None or b is None else b - a or 1.0 for a, b in pairs]
+    return np.array(spans, np.float64)
+
+
+def _output_error(
+    output: CandidateOutput,
+    sample: ExactSample,
+    system: FuzzySystem,
+    bound: float | None,
+    origin: str,
+) -> Error:
+    exact, numbers = sample.exact, output.outputs
+    assert isinstance(exact, Outcome)
+    flips = output.labels != exact.status
+    known = np.zeros((0, 0)) if exact.outputs is None else exact.outputs
+    if numbers is None:
+        return Error(int(flips.size), None, bound, origin, int(flips.sum()))
+    with np.errstate(invalid="ignore"):
+        gap = np.abs(numbers - known)
+    gap[(numbers == known) | (np.isnan(numbers) & np.isnan(known))] = 0.0
+    gap[np.isnan(gap)] = np.inf
+    largest = gap.max(axis=1, initial=0.0)
+    names = [one.name for one in system.outputs]
+    return Error(
+        int(flips.size),
+        float((largest / _spans(system)).max(initial=0.0)),
+        bound,
+        origin,
+        int(flips.sum()),
+        outputs=dict(zip(names, largest.tolist(), strict=True)),
+    )
 
 
 def measured_error(
@@ -121,6 +196,9 @@ def measured_error(
 ) -> Error:
     """Return how far the answers to a sample are from the exact ones."""
     model, truth = sample.model, sample.exact
+    if isinstance(model, FuzzySystem):
+        return _output_error(output, sample, model, bound, origin)
+    assert isinstance(truth, Decisions)
     flips = output.labels != truth.label
     largest = band = margin = None
     if isinstance(model, RuleBase):
@@ -131,7 +209,7 @@ def measured_error(
             band = float((truth.margin <= 2.0 * bound).mean()) if flips.size else 0.0
         if flips.any():
             margin = float(truth.margin_high[flips].max())
-    lost, gained = _cover(output, sample)
+    lost, gained = _cover(output, model, truth)
     return Error(
         int(flips.size),
         largest,
@@ -145,9 +223,9 @@ def measured_error(
     )
 
 
-def _cover(output: CandidateOutput, sample: ExactSample) -> tuple[int, int]:
+def _cover(output: CandidateOutput, model: Model, truth: Decisions) -> tuple[int, int]:
     """Return how many rows lost and gained cover, as far as the answers show it."""
-    model, truth, strengths = sample.model, sample.exact, output.strengths
+    strengths = output.strengths
     weighed = truth.status != Status.MISSING
     if strengths is not None:
         weighed = weighed & ~np.isnan(strengths).any(axis=0)
@@ -176,15 +254,17 @@ def _part(sample: ExactSample, most: int) -> ExactSample:
     return ExactSample(sample.model, values, exact)
 
 
-def _most_rows(model: Model) -> int:
-    rules = len(model.rules) if isinstance(model, RuleBase) else 1
+def _most_rows(model: Document) -> int:
+    rules = len(model.rules) or 1
+    if model.outputs:
+        rules = 1 + program_of(model, with_strengths=False).size // _STEPS_OF_RULE
     return max(min(MOST_ROWS, _MOST_STRENGTHS // rules), 1)
 
 
 _REACH = 0.1  # of a range that is taken from landmarks: how far beyond rows may lie
 
 
-def made_rows(model: Model, count: int, *, seed: int = 0) -> tuple[FloatArray, str]:
+def made_rows(model: Document, count: int, *, seed: int = 0) -> tuple[FloatArray, str]:
     """Return rows that are spread evenly over what a model declares.
 
     Each input is drawn by itself between the `low` and `high` of its variable. One that
@@ -215,7 +295,7 @@ def made_rows(model: Model, count: int, *, seed: int = 0) -> tuple[FloatArray, s
     return values, what
 
 
-def _range(model: Model, name: str) -> tuple[float, float, bool]:
+def _range(model: Document, name: str) -> tuple[float, float, bool]:
     """Return between which values an input is drawn, and whether it declares them."""
     known: list[float] = []
     for variable in model.variables:
@@ -224,7 +304,8 @@ def _range(model: Model, name: str) -> tuple[float, float, bool]:
             if low is not None and high is not None:
                 return *_apart(low, high), True
             ends = [end for end in (low, high) if end is not None]
-            known += [*ends, *(v for t in variable.terms for v in landmarks(t.shape))]
+            curves = [shape_of(term.function) for term in variable.terms]
+            known += [*ends, *(v for c in curves if c for v in landmarks(c))]
     if not known:
         for variable in model.variables:
             for part in variable.parts:

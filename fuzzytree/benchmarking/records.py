@@ -23,12 +23,15 @@ class CandidateOutput(msgspec.Struct, frozen=True):
     """What a candidate answered.
 
     Attributes:
-        labels: The class number of each row, -1 for no class.
+        labels: The class number of each row, -1 for no class; of a fuzzy system the
+            status of each row.
         strengths: Shape (rules, rows), or None where the candidate returns none.
+        outputs: Shape (outputs, rows), of a fuzzy system.
     """
 
     labels: IntArray
     strengths: FloatArray | None = None
+    outputs: FloatArray | None = None
 
 
 class LoadedCandidate(msgspec.Struct, frozen=True):
@@ -123,15 +126,18 @@ class Error(msgspec.Struct, frozen=True):
 
     Attributes:
         rows: Rows on which it was observed.
-        largest: The largest observed difference of a strength from the exact one; None
-            where the candidate returns no strengths.
+        largest: The largest observed difference of a strength from the exact one, or of
+            an output of a fuzzy system from the definition's, as a share of its range;
+            None where the candidate returns neither.
         bound: The certified bound of it; None where there is none.
         origin: Where the bound comes from, or why there is none.
-        flips: Rows whose class differs from the exact one.
+        flips: Rows whose class differs from the exact one, or whose status does in a
+            fuzzy system.
         largest_flip_margin: The largest exact margin of such a row.
         in_band: Share of rows whose exact margin is at most twice the bound.
         cover_lost: Rows that a rule covers exactly and none in the candidate.
         cover_gained: Rows that none covers exactly and one in the candidate.
+        outputs: The largest difference of each output of a fuzzy system, in its unit.
     """
 
     rows: int
@@ -143,6 +149,7 @@ class Error(msgspec.Struct, frozen=True):
     in_band: float | None = None
     cover_lost: int = 0
     cover_gained: int = 0
+    outputs: dict[str, float] = {}
 
 
 class Point(msgspec.Struct, frozen=True):

@@ -30,7 +30,14 @@ from fuzzytree.benchmarking.records import (
     Study,
     Timing,
 )
-from fuzzytree.model import FloatArray, Model, Progress, as_names, fingerprint, noticed
+from fuzzytree.model import (
+    Document,
+    FloatArray,
+    Progress,
+    as_names,
+    fingerprint,
+    noticed,
+)
 from fuzzytree.runtimes import baseline
 
 ROWS = (1, 1_000, 1_000_000)
@@ -95,7 +102,7 @@ class BenchSettings(msgspec.Struct, frozen=True):
 
 
 def bench(
-    model: Model,
+    model: Document,
     *,
     values: FloatArray | None = None,
     data: str = "",
@@ -107,7 +114,7 @@ def bench(
     """Measure error against run time for every way of running a model.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         values: Rows of shape (inputs, rows), in the order of `model.inputs`; repeated
             where a call has more. Rows are made of the declared ranges if None.
         data: What to call them.
@@ -168,7 +175,7 @@ def _data_text(text: str, count: int, plan: BenchSettings) -> str:
 
 
 def run_study(
-    model: Model,
+    model: Document,
     candidates: Sequence[Candidate],
     *,
     values: FloatArray,
@@ -224,7 +231,7 @@ class _Run:
 
     def __init__(
         self,
-        model: Model,
+        model: Document,
         values: FloatArray,
         plan: BenchSettings,
         progress: Progress,
@@ -463,10 +470,10 @@ def fitting(
 
 
 def _rank(one: Candidate) -> int:
-    """Return 0 for what others are compared with, then ours, peers, variants."""
+    """Return 0 for what others are compared with, then peers, ours, variants."""
     if _is_measure(one):
         return 0
-    return {"floor": 0, "runtime": 1, "peer": 2, "variant": 3}[one.kind]
+    return {"floor": 0, "peer": 1, "runtime": 2, "variant": 3}[one.kind]
 
 
 def _is_measure(one: Candidate) -> bool:

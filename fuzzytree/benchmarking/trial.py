@@ -24,7 +24,7 @@ from typing import IO, cast
 
 from fuzzytree.benchmarking.candidates import gather
 from fuzzytree.benchmarking.records import Candidate
-from fuzzytree.model import FloatArray, Model, Progress
+from fuzzytree.model import Document, FloatArray, Progress
 
 _START = """
 import json, sys
@@ -38,7 +38,7 @@ _LATE = "a third of the budget was over before it was tried; a larger one helps"
 
 
 def tried(
-    model: Model,
+    model: Document,
     names: Sequence[str],
     values: FloatArray,
     *,
@@ -62,7 +62,7 @@ def tried(
 
 
 def _one_child(
-    model: Model,
+    model: Document,
     names: Sequence[str],
     values: FloatArray,
     peers: str | None,
@@ -107,7 +107,7 @@ def _one_child(
 
 
 def _send(
-    stream: IO[bytes], work: tuple[str | None, Model, Sequence[str], object]
+    stream: IO[bytes], work: tuple[str | None, Document, Sequence[str], object]
 ) -> None:
     try:
         stream.write(json.dumps(sys.path).encode() + b"\n")
@@ -140,7 +140,7 @@ def serve() -> None:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a library prints must not look like a report
     peers, model, names, values = cast(
-        "tuple[str | None, Model, Sequence[str], FloatArray]",
+        "tuple[str | None, Document, Sequence[str], FloatArray]",
         pickle.loads(sys.stdin.buffer.read()),  # written by our own parent
     )
     known = {one.name: one for one in gather(model, values, peers)[0]}

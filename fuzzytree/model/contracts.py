@@ -281,7 +281,7 @@ class Runtime(msgspec.Struct, frozen=True):
     runs: tuple[ModelKind, ...]
     load: Loader
     dtype: Dtype = "float64"
-    bound: Callable[[Model], tuple[float, str]] | None = None
+    bound: Callable[[Any], tuple[float, str]] | None = None
     cannot: tuple[str, ...] = ()
     extra: str | None = None
     modules: tuple[str, ...] = ()
@@ -293,7 +293,7 @@ class Runtime(msgspec.Struct, frozen=True):
     is_reentrant: bool = False
     in_variants: bool = False
     prepare: Callable[..., Prepared] | None = None
-    size: Callable[[Model], int] | None = None
+    size: Callable[[Any], int] | None = None
     note: str = ""
 
 

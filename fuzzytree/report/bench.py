@@ -35,8 +35,9 @@ _WIDTH = 96  # of a line of words
 _LEGEND = (
     "* no candidate is both faster and more exact; +- the 95 % interval of the median;",
     "speed: times as fast as the default runtime; floor x: as reading the columns;",
-    "error: the largest of a strength, observed; certified: the bound of it;",
-    "changed: classes other than those of exact arithmetic; at edges: in rows on a cut",
+    "error: the largest observed of a strength, or of an output as a share of its",
+    "range; certified: the bound of it; changed: classes (statuses of systems) other",
+    "than the exact ones; at edges: in rows on a cut",
 )
 
 

@@ -23,7 +23,6 @@ from fuzzytree.model import (
     Dtype,
     FloatArray,
     FuzzySystem,
-    Model,
     ModelKind,
     Outcome,
     Prepared,
@@ -176,7 +175,7 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
 
 
 def prepare(
-    model: Model,
+    model: Document,
     *,
     dtype: Dtype = "float64",
     readable: bool = False,
@@ -201,7 +200,9 @@ def prepare(
     _require_packages("running")
 
     outputs: tuple[Output, ...] = ("rule", "status", "strengths")
-    if not model.rules:
+    if isinstance(model, FuzzySystem):
+        outputs = ("outputs", "status")
+    elif not model.rules:
         outputs = outputs[:2]
     elif probabilities and model.semantics.sharpness:
         outputs = (*outputs, "probabilities")

@@ -16,7 +16,6 @@ from fuzzytree.model import (
     Document,
     FloatArray,
     FuzzySystem,
-    Model,
     Outcome,
     Run,
     Runtime,
@@ -24,7 +23,7 @@ from fuzzytree.model import (
 from fuzzytree.runtimes.rows import checked, outcome_of, system_outcome
 
 
-def load(model: Model, *, with_strengths: bool = True) -> Run:
+def load(model: Document, *, with_strengths: bool = True) -> Run:
     """Return a function that answers rows one after another by generated Python."""
     return load_content(write_python(model).content, model)
 
@@ -56,7 +55,7 @@ def _answer_of(content: bytes) -> Callable[[Sequence[float]], Any]:
 RUNTIMES = (
     Runtime(
         "python",
-        ("tree", "rules"),
+        ("tree", "rules", "system"),
         load,
         is_slow=True,
         size=lambda model: len(write_python(model).content),

@@ -11,7 +11,7 @@ strength 1, wins alone.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Literal
+from typing import Literal, overload
 
 import msgspec
 from msgspec.structs import replace
@@ -20,6 +20,7 @@ from fuzzytree.errors import InvalidModelError
 from fuzzytree.model import (
     Branch,
     Conjunction,
+    Document,
     FuzzyTree,
     Kind,
     Proposition,
@@ -28,9 +29,10 @@ from fuzzytree.model import (
     Term,
     Use,
     Variable,
+    kind_of,
 )
 
-Form = Literal["tree", "relative rules", "raw rules", "rules"]
+Form = Literal["tree", "relative rules", "raw rules", "rules", "system"]
 """What can be made of a model, as people call it."""
 
 TITLES: Mapping[Use, Form] = {
@@ -41,13 +43,25 @@ TITLES: Mapping[Use, Form] = {
 """The form of a tree that serves each use."""
 
 
+@overload
 def forms(
     model: FuzzyTree | RuleBase, uses: Iterable[Use] | None = None
-) -> dict[Form, FuzzyTree | RuleBase]:
+) -> dict[Form, FuzzyTree | RuleBase]: ...
+
+
+@overload
+def forms(
+    model: Document, uses: Iterable[Use] | None = None
+) -> dict[Form, Document]: ...
+
+
+def forms(
+    model: Document, uses: Iterable[Use] | None = None
+) -> Mapping[Form, Document]:
     """Return what can be made of a model, by the name that people call it.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         uses: Only what serves these; all that the model can serve if None.
 
     Example:
@@ -55,8 +69,8 @@ def forms(
         >>> list(forms(random_tree(1)))
         ['tree', 'relative rules', 'raw rules']
     """
-    if isinstance(model, RuleBase):
-        return {"rules": model}
+    if not isinstance(model, FuzzyTree):
+        return {kind_of(model): model}
     wanted = set(TITLES if uses is None else uses)
     result: dict[Form, FuzzyTree | RuleBase] = {}
     if "tree" in wanted:

@@ -36,6 +36,7 @@ def test_the_facts_of_answers_count_flips_band_and_cover() -> None:
         "in_band": 0.5,
         "cover_lost": 1,
         "cover_gained": 1,
+        "outputs": {},
     }
 
 

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.benchmarking import trial
+from fuzzytree.benchmarking import judging, trial
 from fuzzytree.benchmarking.candidates import chosen, found_of, gather
 from fuzzytree.benchmarking.clock import TimeSource
 from fuzzytree.benchmarking.judging import made_rows, repeated
@@ -35,10 +35,11 @@ from fuzzytree.benchmarking.study import (
     fitting,
     run_study,
 )
+from fuzzytree.model.contracts import Outcome
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes.native import load
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray, Progress
@@ -528,3 +529,34 @@ def test_rows_of_a_table_are_named_and_counted() -> None:
     assert study.data == "t.csv, 7 rows, repeated to make 20"
     assert study.points[0].error is not None
     assert study.points[0].error.rows == 7
+
+
+def test_a_system_is_measured_in_each_runtime_that_runs_systems() -> None:
+    system = random_system(4, formulas="none", defuzzifier="of curves")
+    plan = BenchSettings(rows=(20,), threads=(1,), rounds=6, budget_s=20.0)
+    study = bench(system, select=["native", "reference", "floor"], plan=plan)
+    points = {point.name: point for point in study.points}
+    assert {"native: system", "reference: system"} <= set(points)
+    for point in points.values():
+        if point.kind == "floor":
+            continue
+        error = point.error
+        assert error is not None
+        assert error.flips == 0
+        assert set(error.outputs) == {output.name for output in system.outputs}
+        assert error.largest is not None
+        assert error.bound is None or error.largest <= error.bound
+
+
+def test_a_system_that_answers_otherwise_has_an_error() -> None:
+    system = random_system(4, formulas="none", defuzzifier="of curves")
+    values, _ = made_rows(system, 30)
+    sample = judging._exact_sample(system, values)
+    assert isinstance(sample.exact, Outcome)
+    assert sample.exact.outputs is not None
+    moved = sample.exact.outputs + 0.5
+    output = CandidateOutput(sample.exact.status, None, moved)
+    error = judging.measured_error(output, sample, 1e-9, "a test")
+    assert [*error.outputs.values()] == pytest.approx([0.5] * len(error.outputs))
+    assert error.largest is not None
+    assert error.largest > 1e-9

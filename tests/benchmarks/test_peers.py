@@ -20,6 +20,7 @@ from peers import TREE_PEERS, engines, peers
 from peers.crisp import nodes_of
 from peers.sampling import lines_bound
 
+import fuzzytree as ft
 from fuzzytree.benchmarking.candidates import found_of, questions
 from fuzzytree.benchmarking.records import Candidate, CandidateOutput, LoadedCandidate
 from fuzzytree.errors import LossError
@@ -43,12 +44,14 @@ from fuzzytree.runtimes.degrees import shape_degrees
 from fuzzytree.runtimes.native import load as load_native
 from fuzzytree.runtimes.reference import RUNTIMES as REFERENCE
 from fuzzytree.runtimes.rows import axis_lines, plan_axes
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import probe_values, random_tree, with_points
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray, IntArray
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 DOUBLE = ("treelite", "m2cgen python", "m2cgen c", "onnx evaluator")
 SINGLE = ("scikit-learn", "scikit-learn core", "skl2onnx")
 ENGINES = ("pyfuzzylite", "simpful")
@@ -609,3 +612,18 @@ def test_the_list_of_peers_is_made_without_loading_any() -> None:
     command = [sys.executable, "-c", code, str(Path(str(module.__file__)).parent)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+def test_pyfuzzylite_answers_a_system_and_the_others_are_left_out() -> None:
+    pytest.importorskip("fuzzylite")
+    system = ft.read(EXAMPLES / "tipper.fll").model
+    candidates, omitted = peers(system)
+    assert [one.name for one in candidates] == ["pyfuzzylite: system"]
+    assert {one.name for one in omitted} == {"simpful", "scikit-fuzzy"}
+    values = np.array([[3.0, np.nan, 9.5], [8.0, 1.0, 0.5]])
+    found = candidates[0].load(1).answer(values)
+    right = find_runtime("native").load(system)(values)
+    assert found.outputs is not None
+    assert right.outputs is not None
+    np.testing.assert_allclose(found.outputs, right.outputs, rtol=1e-9)
+    assert found.labels.tolist() == right.status.tolist()
