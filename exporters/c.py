@@ -241,8 +241,8 @@ class CFile(CModel):
         return fill(template, self.prefix)
 
     def _declarations(self) -> Iterator[str]:
-        model, rules = self.model, isinstance(self.model, RuleBase)
-        count = len(model.rules) if isinstance(model, RuleBase) else len(model.leaves)
+        model, rules = self.model, bool(self.model.rules)
+        count = len(model.rule_labels)
         is_new = has_own_values(model.variables)
         yield self._fill(f"typedef {self.numbers.name} name_real;\n\n")
         for what, size in (
@@ -292,7 +292,7 @@ def _heading(model: Document, source: str) -> Iterator[str]:
     inputs = [one for one in model.variables if not one.parts]
     for place, variable in enumerate(inputs):
         yield f" *   x[{place}] {_described(variable)}\n"
-    if isinstance(model, FuzzySystem):
+    if model.outputs:
         yield " * Outputs, in order:\n"
         for place, output in enumerate(model.outputs):
             yield f" *   outputs[{place}] {_described(output)}\n"
@@ -306,12 +306,14 @@ def _heading(model: Document, source: str) -> Iterator[str]:
             )
             yield f" * {remark(variable.name)}: {parts}\n"
     yield " *\n"
-    if isinstance(model, RuleBase):
-        for number, rule in enumerate(model.rules, 1):
-            yield f" * {number}. {remark(sentence(rule))}\n"
-    else:
-        for line in outline(model):
-            yield f" * {remark(line)}\n"
+    match model:
+        case RuleBase():
+            for number, rule in enumerate(model.rules, 1):
+                yield f" * {number}. {remark(sentence(rule))}\n"
+        case FuzzyTree():
+            yield from (f" * {remark(line)}\n" for line in outline(model))
+        case FuzzySystem():  # its rules are steps, and only counted
+            pass
 
 
 def _described(one: Variable | SystemOutput) -> str:

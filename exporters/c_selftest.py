@@ -14,7 +14,7 @@ import numpy as np
 from fuzzytree.exporters.c_tables import HIGH_END, LOW_END, POINTS, CModel, Tables
 from fuzzytree.exporters.c_text import CNumbers, bits_of
 from fuzzytree.exporters.program_text import answer_of, digest_of
-from fuzzytree.model import FuzzyTree, Model, stand_ins
+from fuzzytree.model import Model, stand_ins
 from fuzzytree.semantics import Answer, Row, Status, few_probes
 
 _MOST_ROWS = 160
@@ -158,12 +158,11 @@ def answer_of_tables(file: CModel, row: Row) -> Answer:
     """Return the prediction of the tables of a file in their number type."""
     model, tables = file.model, file.tables
     values = _axis_values(file, row)
-    if isinstance(model, FuzzyTree) or tables is None:
+    if tables is None:
         if values is None:
             return Answer(0, model.semantics.missing, Status.MISSING)
         rule = _leaf(file, values)
-        labels = model.leaves if isinstance(model, FuzzyTree) else ()
-        return Answer(rule, labels[rule - 1].label, Status.DECIDED)
+        return Answer(rule, model.rule_labels[rule - 1], Status.DECIDED)
     if values is None:
         lost = (math.nan,) * len(model.rules)
         return Answer(0, model.semantics.missing, Status.MISSING, lost)

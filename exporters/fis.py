@@ -130,7 +130,7 @@ def write(
         system = without_heights(system, "FIS", losses)
     system, lost = with_known_curves(system, dialect, tolerance)
     losses += [*lost, *_losses(system, dialect)]
-    if isinstance(model, FuzzySystem):  # of scores, a rule always fires
+    if model.outputs:  # of scores, a rule always fires
         losses += _default_losses(system, dialect)
     terms = FisTerms(system, dialect, tolerance)
     lines = _lines(system, terms)
