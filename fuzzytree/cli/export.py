@@ -9,6 +9,8 @@ from fuzzytree.cli.console import (
     model_argument,
     option,
     output_option,
+    say,
+    say_rows,
     takes,
     wrong_options,
 )
@@ -17,7 +19,7 @@ from fuzzytree.cli.representation import (
     WritingOptions,
     wanted_format,
 )
-from fuzzytree.model import ModelPath
+from fuzzytree.model import Document, ModelPath
 
 
 class ExportOptions(WritingOptions):
@@ -55,6 +57,9 @@ class ExportOptions(WritingOptions):
         "--readable", "onnx: write a node with a name for each step of the model."
     )
     plain: bool = flag("--plain", "onnx: write a tree without operators of ai.onnx.ml.")
+    report: bool = flag(
+        "--report", "c: print the bytes that small machines need for the file."
+    )
 
 
 @click.command("export", short_help="Write a model in another format.")
@@ -81,5 +86,28 @@ def command(options: ExportOptions) -> int:
     form = wanted_format(options.output, options.to)
     with wrong_options():
         check_names(form, values)
+    if options.report and (form.name != "c" or options.output == "-"):
+        raise click.UsageError(
+            "--report is about a file of C; write one with -o FILE.c"
+        )
     found, read_as = read_source(options.model, quiet=options.quiet)
-    return carry(found, options.model, read_as, form, options, options=values)
+    code = carry(found, options.model, read_as, form, options, options=values)
+    if options.report and not code:
+        _report(found.model, options.output)
+    return code
+
+
+def _report(model: Document, path: str) -> None:
+    """Print what a file of C needs on small machines."""
+    from pathlib import Path
+
+    from fuzzytree.runtimes import MachineSize, machine_sizes
+    from fuzzytree.semantics import program_of
+
+    say_rows(("steps", f"{program_of(model, with_strengths=False).size:,}", "a row"))
+    for size in machine_sizes(Path(path).read_bytes()):
+        if not isinstance(size, MachineSize):
+            say(f"size     {size}")
+            continue
+        text = f"{size.flash:,} bytes of flash, {size.ram:,} of RAM, {size.stack:,}"
+        say_rows(("size", size.machine, f"{text} of stack"))

@@ -1,5 +1,7 @@
 from .c import COMPILERS as COMPILERS
 from .c import compiled as compiled
+from .machines import MachineSize as MachineSize
+from .machines import machine_sizes as machine_sizes
 from .mixing import class_probabilities as class_probabilities
 from .native_rules import fire as fire
 from .one_row import load as load

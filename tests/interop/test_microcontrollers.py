@@ -14,10 +14,12 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
+from fuzzytree.cli.program import main
 from fuzzytree.exporters.c import write_c
 from fuzzytree.formats import read_fll
 from fuzzytree.model import FloatArray, FuzzySystem
 from fuzzytree.runtimes.c import compiled, load
+from fuzzytree.runtimes.machines import MACHINES, MachineSize, machine_sizes
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics import error_bounds, from_system, infer, system_probes
 from fuzzytree.testing import random_system
@@ -59,12 +61,6 @@ METHODS = (
     "SmallestOfMaximum 100",
     "LargestOfMaximum 33",
 )
-CORTEX = "arm-none-eabi-gcc -mthumb -std=c99 -Os"
-MACHINES = {
-    "Cortex-M4": f"{CORTEX} -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16",
-    "Cortex-M0": f"{CORTEX} -mcpu=cortex-m0",
-    "ATmega328P": "avr-gcc -mmcu=atmega328p -std=c99 -Os",
-}
 
 
 def fan(method: str = METHODS[0]) -> FuzzySystem:
@@ -80,19 +76,13 @@ def fan(method: str = METHODS[0]) -> FuzzySystem:
     return system
 
 
-def size_of(folder: Path, content: bytes, machine: str) -> tuple[int, int]:
+def size_of(content: bytes, machine: str) -> tuple[int, int]:
     """Return the bytes of code and constants, and of the stack, without libraries."""
-    source, target = folder / "model.c", folder / "model.o"
-    source.write_bytes(content)
-    words = [*MACHINES[machine].split(), "-fstack-usage", "-c", str(source)]
-    words += ["-o", str(target)]
-    subprocess.run(words, check=True)
-    size = words[0].replace("-gcc", "-size")
-    done = subprocess.run([size, target], capture_output=True, text=True, check=True)
-    text, data, bss = map(int, done.stdout.splitlines()[1].split()[:3])
-    assert bss == 0
-    usage = target.with_suffix(".su").read_text()
-    return text + data, sum(map(int, re.findall(r"\t(\d+)\t", usage)))
+    for size in machine_sizes(content):
+        if isinstance(size, MachineSize) and size.machine == machine:
+            assert size.ram == 0
+            return size.flash, size.stack
+    raise AssertionError(f"no size for {machine}")
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -130,7 +120,7 @@ def test_a_controller_of_nine_rules_is_small(
     tmp_path: Path, program: Need, machine: str
 ) -> None:
     program("arm-none-eabi-gcc")
-    flash, stack = size_of(tmp_path, write_c(fan(), selftest=False).content, machine)
+    flash, stack = size_of(write_c(fan(), selftest=False).content, machine)
     assert 1000 < flash <= 2500
     assert 100 < stack <= 300
 
@@ -315,7 +305,7 @@ def test_a_controller_in_fixed_point_is_small(
 ) -> None:
     program(MACHINES[machine].split()[0])
     content = write_c(fan(), dtype=dtype, selftest=False).content
-    code, depth = size_of(tmp_path, content, machine)
+    code, depth = size_of(content, machine)
     assert 800 < code <= flash
     assert 30 < depth <= stack
 
@@ -330,6 +320,19 @@ def test_a_controller_in_float32_is_small(
 ) -> None:
     program(MACHINES[machine].split()[0])
     content = write_c(fan(), dtype="float32", selftest=False).content
-    flash, stack = size_of(tmp_path, content, machine)
+    flash, stack = size_of(content, machine)
     assert 1000 < flash <= most
     assert 50 < stack <= 150
+
+
+def test_a_report_shows_what_the_compilers_say(
+    program: Need, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    program("arm-none-eabi-gcc")
+    model, target = tmp_path / "fan.yaml", tmp_path / "fan.c"
+    ft.save(fan(), model)
+    assert main(["export", str(model), "-o", str(target), "--report"]) == 0
+    flash, stack = size_of(target.read_bytes(), "Cortex-M4")
+    shown = capsys.readouterr().err
+    assert f"{flash:,} bytes of flash, 0 of RAM, {stack:,} of stack" in shown
+    assert main(["export", str(model), "-o", str(tmp_path / "a.py"), "--report"]) == 2
