@@ -1,0 +1,371 @@
+"""Every verb and every target of fuzzytree on every kind of model.
+
+`python -m tests.interop.matrix > docs/reference/matrix.md` writes the page; with
+`--kinds PATTERN` it prints the cells of some kinds instead. The exit code is 1 if a
+cell is wrong, or refused without a reason that stands in `REASONS`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import csv
+import io
+import json
+import math
+import os
+import random
+import re
+import shlex
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fuzzytree.cli.program import main
+from tests.interop.matrix_models import KINDS, write_model
+
+ROWS = 60
+TARGETS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "yaml": (".yaml", ()),
+    "fcl": (".fcl", ()),
+    "fcl jfuzzylogic": (".jfl.fcl", ("--dialect", "jfuzzylogic")),
+    "fll": (".fll", ()),
+    "fis": (".fis", ()),
+    "fis matlab": (".mat.fis", ("--dialect", "matlab")),
+    "fml": (".fml", ()),
+    "onnx": (".onnx", ()),
+    "onnx float32": (".32.onnx", ("--set", "dtype=float32")),
+    "onnx readable": (".readable.onnx", ("--set", "readable=true")),
+    "pmml": (".pmml", ()),
+    "c": (".c", ()),
+    "c float32": (".32.c", ("--set", "dtype=float32")),
+    "c q15": (".q15.c", ("--set", "dtype=q15")),
+    "javascript": (".mjs", ()),
+    "python": (".py", ()),
+    "sql sqlite": (".sql", ()),
+    "sql duckdb": (".duckdb.sql", ("--set", "dialect=duckdb")),
+    "sql postgresql": (".pg.sql", ("--set", "dialect=postgresql")),
+    "sql spark": (".spark.sql", ("--set", "dialect=spark")),
+    "structured text": (".st", ()),
+    "plcopen": (".xml", ("--to", "structured-text", "--set", "layout=plcopen")),
+    "smt-lib": (".smt2", ()),
+}
+"""What is written: the end of the file's name, and options of `convert`."""
+
+READABLE = (".yaml", ".fcl", ".fll", ".fis", ".fml", ".onnx")
+VERBS: Mapping[str, str] = {
+    "show": "show M",
+    "show --picture": "show M --picture picture.svg",
+    "run": "run M rows.csv",
+    "run -o parquet": "run M rows.csv -o out.parquet",
+    "run --why": "run M rows.csv --why --json --strengths rule",
+    "run --probabilities": "run M rows.csv --probabilities",
+    "check": "check M --data rows.csv --generate 100",
+    "audit": "audit M --budget 8 --json -o audit.json --fail-on never",
+    "recheck": "recheck audit.json M",
+    "audit --data --page": "audit M --data rows.csv --page page.html --budget 4 "
+    "--fail-on never",
+    "diff": "diff M M --budget 4",
+    "bench": "bench M --budget 2 --rows 50 --threads 1 --select native",
+    "stability": "stability M --runtime native --runtime reference",
+    "needs": "needs M -o needs.yaml --budget 1",
+}
+LETTERS = {
+    ".": "it works",
+    "l": "it works with losses that are listed and allowed",
+    "n": "it is written, and nothing here runs it",
+    "r": "it is refused",
+    "W": "wrong: answers differ, or a printed next step fails",
+    "X": "a crash",
+}
+REASONS: tuple[tuple[str, str], ...] = (
+    (
+        "has no probabilities of classes",
+        "controllers, raw rules and rules by hand have no probabilities to give",
+    ),
+    (
+        "dtype: there is float64",
+        "ONNX graphs of systems are in double: in float32 their error would have no "
+        "derived bound, as C in float32 has",
+    ),
+    (
+        "C has float64, float32|q15|q31|fixed point",
+        "fixed point is for controllers whose rules cover every point and whose steps "
+        "have ranges and need no exp or power; the sentence names the step",
+    ),
+    (
+        "only YAML is checked again",
+        "the re-checker shares no code with the readers; its sentence gives the "
+        "command that writes the YAML",
+    ),
+    (
+        "the dialect portable has no|has no .* there|no such conclusion",
+        "this dialect has no words for it; the sentence names one that has",
+    ),
+    (
+        "must reference an input, but there is none",
+        "these formats need a rule with an input, and a tree of one leaf tests nothing",
+    ),
+    (
+        "which decides for no class; needs",
+        "not yet: what a system does not need is not reported",
+    ),
+)
+"""Why a refusal is no hole: a part of its sentence, and the reason."""
+
+
+class Cell(NamedTuple):
+    """What became of a verb or a target: a letter of `LETTERS`, and a sentence."""
+
+    letter: str
+    sentence: str = ""
+    command: str = ""
+
+
+Cells = dict[str, Cell]
+
+
+def call(*words: str) -> tuple[int, str, str]:
+    """Run a command in this process: its exit code, stdout and stderr."""
+    bodies = io.BytesIO(), io.BytesIO()
+    out, err = (io.TextIOWrapper(body, "utf-8") for body in bodies)
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = main(words)
+        except SystemExit as end:
+            code = int(end.code or 0)
+    out.flush()
+    err.flush()
+    answers, messages = (body.getvalue().decode("utf-8") for body in bodies)
+    return code, answers, messages
+
+
+def cell_of(words: Iterable[str], finding: str = "W") -> tuple[Cell, str]:
+    """Run a command, and return its cell and what it prints; 1 is a `finding`."""
+    words = [*words]
+    command = shlex.join(["fuzzytree", *words])
+    try:
+        code, out, err = call(*words)
+    except Exception as error:  # whatever it is, it is a crash
+        return Cell("X", f"{type(error).__name__}: {error}", command), ""
+    lines = [line for line in err.splitlines() if not line.startswith("remark ")]
+    sentence = " ".join(lines[:2])[:240]
+    letter = {0: ".", 1: finding, 2: "r"}.get(code, "X")
+    if letter == "r" and "Traceback" in err:
+        letter = "X"
+    if letter == ".":
+        for line in re.findall(r"next:?\s+fuzzytree ([^\n]+)", out + err):
+            step = shlex.split(line)
+            if step[0] != "check" and call(*step)[0]:
+                return Cell("W", f"the next step fails: {line}", command), out
+    return Cell(letter, "" if letter == "." else sentence, command), out
+
+
+def cells_of(kind: str) -> Cells:
+    """Return the cells of a kind of model, in a folder that is gone afterwards."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            return dict(_cells(kind))
+        finally:
+            os.chdir(before)
+
+
+def _cells(kind: str) -> Iterator[tuple[str, Cell]]:
+    model = write_model(kind)
+    facts = json.loads(call("show", model, "--json")[1])
+    inputs = [v for v in facts["model"]["variables"] if v["name"] in facts["inputs"]]
+    with Path("rows.csv").open("w", newline="", encoding="utf-8") as file:
+        names = [variable["name"] for variable in inputs] or ["unused"]
+        csv.writer(file).writerows([names, *(row or ["1"] for row in _rows(inputs))])
+    for name, verb in VERBS.items():
+        yield name, cell_of(model if word == "M" else word for word in verb.split())[0]
+    truth = _answers(model)
+    for name, (suffix, options) in TARGETS.items():
+        file_name = "out" + suffix
+        words = ["convert", model, file_name, *options]
+        cell, _ = cell_of(words, "l")
+        if cell.letter == "l":
+            again, _ = cell_of([*words, "--allow-loss"], "X")
+            cell = cell if again.letter == "." else again
+        yield name, cell
+        if cell.letter in ".l":
+            yield f"{name}: check", _check(model, file_name, allow=cell.letter == "l")
+            if cell.letter == "." and file_name.endswith(READABLE):
+                yield f"{name}: run", _compared(file_name, truth)
+
+
+def _check(model: str, name: str, *, allow: bool) -> Cell:
+    """Return what `check` says of a file, whose programs it runs."""
+    words = ["check", model, name, "--data", "rows.csv", "--generate", "40"]
+    words += ["--runtime", "native", "--json", *["--allow-loss"] * allow]
+    cell, out = cell_of(words, "l" if allow else "W")
+    if cell.letter == "." and json.loads(out).get("unchecked"):
+        return cell._replace(letter="n")
+    return cell
+
+
+def _answers(model: str) -> list[list[str]]:
+    return list(csv.reader(call("run", model, "rows.csv")[1].splitlines()))[1:]
+
+
+def _compared(name: str, truth: list[list[str]]) -> Cell:
+    """Compare the first cells of a file's answers with those of the model."""
+    answers = _answers(name)
+    pairs = [*zip(answers, truth, strict=False)]
+    wrong = [pair for pair in pairs if not _is_same(pair[0][0], pair[1][0])]
+    if wrong or len(answers) != len(truth):
+        text = f"{len(wrong)} of {len(truth)} rows differ"
+        return Cell("W", text, f"fuzzytree run {name} rows.csv")
+    return Cell(".")
+
+
+def _is_same(one: str, two: str) -> bool:
+    try:
+        return math.isclose(float(one), float(two), rel_tol=1e-9, abs_tol=1e-9)
+    except ValueError:
+        return one == two
+
+
+def _rows(inputs: list[dict[str, Any]]) -> Iterator[list[str]]:
+    """Yield rows at random, some of them on edges or with missing values."""
+    pick = random.Random(7)
+    for number in range(ROWS):
+        row = []
+        for variable in inputs:
+            points = [*_numbers([term["function"] for term in variable["terms"]])]
+            low, high = variable["low"], variable["high"]
+            low = min(points, default=0.0) if low is None else low
+            high = max(points, default=10.0) if high is None else high
+            value = pick.uniform(low, high)
+            if number % 3 == 1 and points:
+                value = pick.choice(points)
+            word = repr(value)
+            if variable["categories"]:
+                word = pick.choice(variable["categories"])
+            elif variable["unit"].startswith("days since"):
+                word = f"2024-0{1 + int(value) % 9}-11"
+            row.append("" if number >= ROWS - 6 and pick.random() < 0.4 else word)
+        yield row
+
+
+def _numbers(value: object) -> Iterator[float]:
+    if isinstance(value, dict):
+        value = [*value.values()]
+    if isinstance(value, list):
+        for part in value:
+            yield from _numbers(part)
+    elif isinstance(value, float) and math.isfinite(value):
+        yield value
+
+
+# --- the page
+
+
+HEAD = """\
+# What works on which kind of model
+
+Every verb and every target, tried on each kind of model. `python -m
+tests.interop.matrix > docs/reference/matrix.md` writes this page, and
+`tests/interop/test_matrix.py` compares it with new results. A target has a second line
+for `check MODEL FILE`, which runs the programs of other languages and compares all
+rows, and a third for the file read back and run.
+
+"""
+
+
+def all_cells(pattern: str = "") -> dict[str, Cells]:
+    """Return the cells of each kind whose name has a pattern."""
+    kinds = [kind for kind in KINDS if re.search(pattern, kind)]
+    with ProcessPoolExecutor(2) as pool:
+        return dict(zip(kinds, pool.map(cells_of, kinds), strict=True))
+
+
+def reason_of(cell: Cell) -> str | None:
+    """Return why a refusal is no hole, if that is known."""
+    return next((why for part, why in REASONS if re.search(part, cell.sentence)), None)
+
+
+def faults(table: Mapping[str, Cells]) -> list[str]:
+    """Return the cells that must not be: wrong ones, and refusals without a reason."""
+    return [
+        f"{cell.letter} {kind}, {name}: {cell.sentence}\n    {cell.command}"
+        for kind, cells in table.items()
+        for name, cell in cells.items()
+        if cell.letter in "WX" or (cell.letter == "r" and reason_of(cell) is None)
+    ]
+
+
+def page(table: Mapping[str, Cells]) -> str:
+    """Return the page: the legend, the table, and a reason for each refusal."""
+    lines = [HEAD, *(f"- `{letter}`: {text}\n" for letter, text in LETTERS.items())]
+    kinds = [*table]
+    letters = {kind: chr(ord("a") + place) for place, kind in enumerate(kinds)}
+    lines.append("\nKinds: ")
+    lines.append(", ".join(f"{letters[kind]} {KINDS[kind].what}" for kind in kinds))
+    lines.append(".\n\n| | " + " | ".join(letters.values()) + " |\n")
+    lines.append("| --- |" + " --- |" * len(kinds) + "\n")
+    names = dict.fromkeys(name for cells in table.values() for name in cells)
+    order = [*VERBS, *(n for t in TARGETS for n in (t, f"{t}: check", f"{t}: run"))]
+    for name in (name for name in order if name in names):
+        row = " | ".join(table[kind].get(name, Cell(" ")).letter for kind in kinds)
+        lines.append(f"| {name} | {row} |\n")
+    lines.append("\n## What is refused, and why\n\n")
+    for part, why in REASONS:
+        places = [
+            f"{name} ({', '.join(marks)})"
+            for name in names
+            if (marks := _marks(table, name, part, letters))
+        ]
+        if places:
+            lines.append(f"- {why}: {'; '.join(places)}.\n")
+    return "".join(lines)
+
+
+def _marks(
+    table: Mapping[str, Cells], name: str, part: str, letters: Mapping[str, str]
+) -> list[str]:
+    """Return the kinds for which a cell is refused for a reason."""
+    found: list[str] = []
+    for kind, cells in table.items():
+        cell = cells.get(name)
+        if cell is None or cell.letter != "r":
+            continue
+        first = next((p for p, _ in REASONS if re.search(p, cell.sentence)), None)
+        if first == part:
+            found.append(letters[kind])
+    return found
+
+
+def letters_of(text: str, kind: str) -> dict[str, str]:
+    """Return the letters that a page has for a kind of model, by cell."""
+    place = [*KINDS].index(kind) + 1
+    rows = [line.strip("|\n").split("|") for line in text.splitlines() if "|" in line]
+    cells = {row[0].strip(): row[place].strip() for row in rows[2:]}
+    return {name: letter for name, letter in cells.items() if letter}
+
+
+def command() -> int:
+    """Print the page, or the cells of some kinds; return 1 for faults."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kinds", default="", help="a pattern; prints cells")
+    options = parser.parse_args()
+    table = all_cells(options.kinds)
+    if options.kinds:
+        for kind, cells in table.items():
+            for name, cell in cells.items():
+                text = f"{cell.letter} {kind:<16} {name:<24} {cell.sentence[:140]}"
+                sys.stdout.write(f"{text}\n")
+    else:
+        sys.stdout.write(page(table))
+    found = faults(table)
+    sys.stderr.write("".join(f"{line}\n" for line in found))
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(command())
