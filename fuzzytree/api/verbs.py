@@ -859,7 +859,7 @@ def needs(
         >>> needs(random_tree(1)).ok
         True
     """
-    first = _model_of(model, "needs")
+    first = checking.as_model(model)
     return benchmarking.report(
         first,
         semantics.pruned(

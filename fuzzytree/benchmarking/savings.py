@@ -20,7 +20,7 @@ from fuzzytree.checking import Needs, needs, prove, sizes_of
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters import write_onnx as write_onnx
-from fuzzytree.model import Agreement, Dtype, Model, Progress, Use, Variable, summary
+from fuzzytree.model import Agreement, Document, Dtype, Progress, Use, Variable, summary
 from fuzzytree.runtimes import baseline, open_onnx
 from fuzzytree.semantics import Pruned, Removed, forms, probe_values
 from fuzzytree.tables import batches, path_of
@@ -132,7 +132,7 @@ class Footprint(msgspec.Struct, frozen=True):
 
 
 def report(
-    model: Model,
+    model: Document,
     remainder: Pruned,
     *,
     uses: Collection[Use] = ("tree", "relative"),
@@ -170,7 +170,7 @@ def report(
     )
 
 
-def stages(model: Model, left: Model) -> dict[str, Model]:
+def stages(model: Document, left: Document) -> dict[str, Document]:
     """Return the model in its stages; without the first if it has no more columns."""
     models = {AS_IT_IS: model, PRUNED: left}
     if set(model.columns) > set(model.inputs):
@@ -178,7 +178,7 @@ def stages(model: Model, left: Model) -> dict[str, Model]:
     return models
 
 
-def with_all_columns(model: Model) -> Model:
+def with_all_columns(model: Document) -> Document:
     """Return a model that needs a value in every column of its training table.
 
     Example:
@@ -196,7 +196,7 @@ def with_all_columns(model: Model) -> Model:
 
 
 def sizes(
-    models: Mapping[str, Model], uses: Collection[Use]
+    models: Mapping[str, Document], uses: Collection[Use]
 ) -> tuple[tuple[Size, ...], tuple[str, ...]]:
     """Return how large each stage is, and what could not be written and why."""
     omissions: list[str] = []
@@ -213,13 +213,16 @@ def sizes(
     return tuple(records), tuple(dict.fromkeys(omissions))
 
 
-def _term_count(model: Model) -> int:
-    groups = [v.terms for v in model.variables]
-    groups += [group.terms for group in getattr(model, "sets", ())]
+def _term_count(model: Document) -> int:
+    groups = [variable.terms for variable in model.variables]
+    groups += [output.terms for output in model.outputs]
+    groups += [group.terms for group in model.sets]
     return sum(map(len, groups))
 
 
-def _files(model: Model, uses: Collection[Use], omissions: list[str]) -> Iterator[File]:
+def _files(
+    model: Document, uses: Collection[Use], omissions: list[str]
+) -> Iterator[File]:
     yaml, python = find_format("yaml"), find_format("python")
     for title, representation in forms(model, uses).items():
         for form in (yaml, python):
@@ -239,7 +242,7 @@ _Key = tuple[str, str, str, str]  # stage, representation, runtime, what
 
 
 def costs(
-    models: Mapping[str, Model],
+    models: Mapping[str, Document],
     uses: Collection[Use],
     *,
     table: object = None,
@@ -297,7 +300,7 @@ def costs(
 
 
 def _calls(
-    stage: str, title: str, model: Model, rows: FloatArray, omissions: list[str]
+    stage: str, title: str, model: Document, rows: FloatArray, omissions: list[str]
 ) -> Iterator[tuple[int, _Key, Call]]:
     """Yield the calls of one representation, each with its number of rows."""
     base = baseline()
@@ -316,14 +319,14 @@ def _calls(
             yield count, (stage, title, name, what), partial(run, values)
 
 
-def _read(table: object, model: Model) -> int:
+def _read(table: object, model: Document) -> int:
     pieces = batches(
         table, model.inputs, trained=model.columns, variables=model.variables
     )
     return sum(batch.values.shape[1] for batch in pieces)
 
 
-def _plain_rows(model: Model, count: int) -> FloatArray:
+def _plain_rows(model: Document, count: int) -> FloatArray:
     """Return probes without extremes, again and again; shape (inputs, count)."""
     values = probe_values(model, 500)
     size = np.abs(values)

@@ -32,6 +32,7 @@ from fuzzytree.model import (
     Band,
     BoolArray,
     Comparison,
+    Document,
     Dtype,
     FloatArray,
     FuzzyTree,
@@ -136,11 +137,11 @@ class Needs(msgspec.Struct, frozen=True):
     omissions: tuple[str, ...] = ()
 
 
-def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Needs:
+def needs(model: Document, *, uses: Collection[Use] = ("tree", "relative")) -> Needs:
     """Return what a model needs, and all that could be left out of it.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         uses: As in `pruned`.
 
     Raises:
@@ -157,9 +158,10 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
         inputs=used.inputs,
         idle_inputs=tuple(n for n in model.inputs if n not in used.inputs),
         combinations=tuple(v.name for v in used.variables if v.parts),
-        terms=sum(len(v.terms) for v in model.variables),
+        terms=sum(len(variable.terms) for variable in model.variables)
+        + sum(len(output.terms) for output in model.outputs),
         sets=sum(len(group.terms) for group in model.sets),
-        rules=len(model.rule_labels),
+        rules=len(model.rule_labels) or len(model.rules),
         idle=left.removed,
         graphs=graphs,
         omissions=omissions,
@@ -169,16 +171,17 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
 # --- graphs
 
 
-_USUAL: tuple[Output, ...] = ("label", "rule")
+def _usual(model: Document) -> tuple[Output, ...]:
+    return ("outputs", "status") if model.outputs else ("label", "rule")
 
 
 def sizes_of(
-    model: Model, uses: Collection[Use], omissions: list[str]
+    model: Document, uses: Collection[Use], omissions: list[str]
 ) -> Iterator[tuple[Form, Dtype, Contents]]:
     """Yield each form of a model and number type with what is in its ONNX graph.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         uses: What a tree serves.
         omissions: Gets a sentence for each that cannot be written.
     """
@@ -186,13 +189,15 @@ def sizes_of(
         for dtype in get_args(Dtype):
             if not form.rules and dtype == "mixed":
                 continue  # a path has comparisons alone: it is float64
+            if form.outputs and dtype != "float64":
+                continue  # graphs of systems are in double
             try:
-                yield title, dtype, _written(form, dtype, _USUAL)
+                yield title, dtype, _written(form, dtype, _usual(form))
             except (LossError, MissingExtraError) as error:
                 omissions.append(f"{title} in {dtype}: {error}")
 
 
-def _graphs(model: Model) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
+def _graphs(model: Document) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
     omissions: list[str] = []
     every = forms(model)
     graphs = [
@@ -204,34 +209,36 @@ def _graphs(model: Model) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
     return tuple(graphs), tuple(omissions)
 
 
-def _explained(title: str, model: Model, whole: Contents) -> Graph:
+def _explained(title: str, model: Document, whole: Contents) -> Graph:
     """Return a graph in double with what is in it for what."""
+    usual = _usual(model)
     more: tuple[Output, ...] = ("status",)
     if model.rules:
-        more = ("status", "strengths")
+        more = ("activations",) if model.outputs else ("status", "strengths")
     on_request = [
-        _because(f"output {one}", _written(model, "float64", (*_USUAL, one)), whole)
+        _because(f"output {one}", _written(model, "float64", (*usual, one)), whole)
         for one in more
     ]
     because: list[Because] = []
     left_out: list[str] = []
-    has_combinations = any(variable.parts for variable in model.variables)
-    others: dict[str, Model] = {
-        COMBINATIONS: free_axes(model) if has_combinations else model
-    }
-    if model.rules:
-        rules = cast("RuleBase", model)
-        others |= {what: without(rules) for what, without in _FEATURES.items()}
+    others: dict[str, Document] = {}
+    if model.classes:
+        decider = cast("Model", model)
+        has_combinations = any(variable.parts for variable in model.variables)
+        others[COMBINATIONS] = free_axes(decider) if has_combinations else model
+        if model.rules:
+            rules = cast("RuleBase", model)
+            others |= {what: without(rules) for what, without in _FEATURES.items()}
     for what, other in others.items():
         if other == model:
             left_out.append(what)
         else:
-            because.append(_because(what, whole, _written(other, "float64", _USUAL)))
+            because.append(_because(what, whole, _written(other, "float64", usual)))
     reasons = (tuple(because), tuple(on_request), tuple(left_out))
     return Graph(title, "float64", whole, *reasons)
 
 
-def _written(model: Model, dtype: Dtype, outputs: Sequence[Output]) -> Contents:
+def _written(model: Document, dtype: Dtype, outputs: Sequence[Output]) -> Contents:
     written = write_onnx(model, dtype=dtype, outputs=outputs, verify=False)
     return contents(written.content)
 
@@ -297,7 +304,7 @@ _FEATURES: Mapping[str, Callable[[RuleBase], RuleBase]] = MappingProxyType(
 
 
 def prove(
-    model: Model,
+    model: Document,
     remainder: Pruned,
     *,
     uses: Collection[Use] = ("tree", "relative"),
@@ -342,7 +349,7 @@ def prove(
     )
 
 
-def _is_seen(model: Model, left: Model, rows: RowSet, dtype: Dtype) -> BoolArray:
+def _is_seen(model: Document, left: Document, rows: RowSet, dtype: Dtype) -> BoolArray:
     """Return the rows in which nothing is missing that only the whole model sees."""
     is_seen: BoolArray = np.ones(rows.numbers.shape, np.bool_)
     kind: Real = np.dtype("float32" if dtype == "float32" else "float64")
@@ -357,9 +364,9 @@ def _is_seen(model: Model, left: Model, rows: RowSet, dtype: Dtype) -> BoolArray
 def _compared(
     title: str,
     runtime: Runtime,
-    model: Model,
-    left: Model,
-    whole: Model,
+    model: Document,
+    left: Document,
+    whole: Document,
     remainder: Pruned,
     rows: RowSet,
 ) -> Iterator[Comparison]:
@@ -384,7 +391,9 @@ def _compared(
             yield compared
 
 
-def _in_old_numbers(outcome: Outcome, model: Model, numbers: Sequence[int]) -> Outcome:
+def _in_old_numbers(
+    outcome: Outcome, model: Document, numbers: Sequence[int]
+) -> Outcome:
     """Return an outcome as if the rules that are gone were there, with strength 0."""
     if not (model.rules and numbers):
         return outcome

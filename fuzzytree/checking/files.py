@@ -274,12 +274,11 @@ def _content(
     fault = first_difference(with_points_once(expected), with_points_once(other))
     if fault and expected.outputs and is_equivalent(expected, other):
         return counted("file", title, "the system but for names", 1, ())
-    for uses in _SERVED if fault and not expected.outputs else ():
+    for uses in _SERVED if fault else ():
         if "raw" in uses and not expected.sets:
             continue
-        left, right = cast("Model", other), cast("Model", expected)
-        if pruned(right, uses=uses).model == other:
-            faults = tuple(proof_faults(right, left, uses=uses))
+        if pruned(expected, uses=uses).model == other:
+            faults = tuple(proof_faults(expected, other, uses=uses))
             served = " and ".join(_SERVICES[use] for use in uses)
             served = "rules" if expected.rules else served
             return counted("proof", title, f"the model's {served}", 1, faults)

@@ -67,13 +67,12 @@ def command(options: NeedsOptions) -> int:
     from pathlib import Path
 
     from fuzzytree import api, benchmarking
-    from fuzzytree.checking import deciding
     from fuzzytree.cli.convert import next_check
     from fuzzytree.exporters import find_format
     from fuzzytree.report import report_lines
     from fuzzytree.semantics import pruned
 
-    first = deciding(api.load(options.model), "needs")
+    first = api.load(options.model)
     wanted = tuple(options.uses) or ("tree", "relative")
     with wrong_options():
         find_format(Path(options.output or "").suffix or "yaml")  # before any work

@@ -66,10 +66,10 @@ def _verdict(footprint: Footprint) -> str:
 
 def _head(needs: Needs) -> Iterator[str]:
     ends = ("leaf", "leaves") if needs.representation == "tree" else ("rule", "rules")
-    what = "fuzzy tree" if needs.representation == "tree" else "rule base"
+    what = {"tree": "fuzzy tree", "rules": "rule base", "system": "fuzzy system"}
     sizes = [counted(needs.rules, *ends), counted(needs.terms, "term")]
     sizes += [counted(needs.sets, "fitted set")] if needs.sets else []
-    yield f"model    {what}, {', '.join(sizes)}"
+    yield f"model    {what[needs.representation]}, {', '.join(sizes)}"
     yield f"needs    {', '.join(needs.inputs) or 'no input'}"
     if needs.combinations:
         yield f"tests    {', '.join(needs.combinations)}"

@@ -15,6 +15,8 @@ Why an answer keeps its bits:
 - *A rule whose propositions never hold together* has strength 0 for every input, and a
   rule of strength 0 neither wins nor ties; but the rules behind it change their
   numbers.
+- *A term of a fuzzy system that no rule names* enters no step of its program: the
+  programs before and after are equal, step by step.
 - *An input that nothing uses* decides alone whether a row with a missing value is
   answered: leaving it out answers more rows.
 """
@@ -32,7 +34,11 @@ from msgspec.structs import replace
 from fuzzytree.model import (
     Band,
     Branch,
+    Document,
+    Formula,
+    FuzzySystem,
     FuzzyTree,
+    Linear,
     Model,
     Part,
     Proposition,
@@ -40,13 +46,16 @@ from fuzzytree.model import (
     RuleBase,
     Sets,
     Shape,
+    SystemOutput,
     Term,
     Use,
     Value,
     Variable,
     proposition_text,
+    questions,
     shapes_of,
 )
+from fuzzytree.semantics.programs.tree_program import program_of
 from fuzzytree.semantics.satisfiability import always_holds, never_firing
 
 USES: tuple[Use, ...] = ("tree", "relative", "raw")
@@ -72,7 +81,7 @@ class Pruned(Value, frozen=True):
             whose leaves keep their numbers.
     """
 
-    model: Model
+    model: Document
     removed: tuple[Removed, ...]
     rules: tuple[int, ...] = ()
 
@@ -83,7 +92,7 @@ class Pruned(Value, frozen=True):
 
 
 def pruned(
-    model: Model,
+    model: Document,
     *,
     uses: Collection[Use] = ("tree", "relative"),
     inputs: bool = False,
@@ -95,7 +104,8 @@ def pruned(
     stay: people and other tools read them, and no answer depends on them.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system; of a system terms that no rule
+            names, and where no formula can read them, variables without terms.
         uses: What a tree is to serve. Its fitted sets stay for `raw`, its flanks for
             `relative`; its path needs the cuts alone. Without effect on a rule base.
         inputs: Whether inputs that nothing uses go as well, and combinations that
@@ -117,19 +127,26 @@ def pruned(
         ["the fitted sets of 'x1'"]
     """
     _check_uses(model, uses)
-    if isinstance(model, FuzzyTree):
-        return _pruned_tree(model, uses, drops_inputs=inputs)
-    return _pruned_rules(model, drops_inputs=inputs, drops_rules=rules)
+    match model:
+        case FuzzyTree():
+            return _pruned_tree(model, uses, drops_inputs=inputs)
+        case RuleBase():
+            return _pruned_rules(model, drops_inputs=inputs, drops_rules=rules)
+        case FuzzySystem():
+            return _pruned_system(model, drops_inputs=inputs)
 
 
-def _check_uses(model: Model, uses: Collection[Use]) -> None:
+def _check_uses(model: Document, uses: Collection[Use]) -> None:
     wrong = [use for use in uses if use not in USES]
     if wrong or not uses:
         named = repr(wrong[0]) if wrong else "none"
         raise ValueError(f"uses: there is {', '.join(USES)}, not {named}")
-    if isinstance(model, RuleBase):
-        return
-    if "raw" in uses and model.nodes and not model.sets:
+    if (
+        isinstance(model, FuzzyTree)
+        and "raw" in uses
+        and model.nodes
+        and not model.sets
+    ):
         raise ValueError(
             f"uses: tree {model.name!r} carries no fitted sets, so it has no raw rules"
         )
@@ -179,6 +196,28 @@ def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> 
     )
     left = replace(rules, variables=variables, rules=tuple(kept))
     return Pruned(left, tuple(removed), tuple(numbers))
+
+
+def _pruned_system(system: FuzzySystem, *, drops_inputs: bool) -> Pruned:
+    named = {
+        (proposition.variable, term)
+        for rule in system.rules
+        for proposition in questions(rule.when)
+        for term in proposition.terms
+    }
+    named |= {(part.output, part.term) for rule in system.rules for part in rule.then}
+    removed: list[Removed] = []
+    outputs = tuple(
+        replace(output, terms=_pruned_terms(output, named, removed))
+        for output in system.outputs
+    )
+    every = [t.function for part in system.all_variables for t in part.terms]
+    reads = any(isinstance(function, Linear | Formula) for function in every)
+    variables = _pruned_variables(
+        system.variables, named, removed, drops_inputs=drops_inputs, keeps=reads
+    )
+    left = replace(system, variables=variables, outputs=outputs)
+    return Pruned(left, tuple(removed))
 
 
 def _needed_propositions(
@@ -237,25 +276,38 @@ def _merged(
     ]
 
 
+def _pruned_terms(
+    of: Variable | SystemOutput,
+    named: Collection[tuple[str, str]],
+    removed: list[Removed],
+) -> tuple[Term, ...]:
+    """Return the terms that are named, and note the others."""
+    removed += [
+        Removed(f"term {term.name!r} of {of.name!r}", "nothing names it")
+        for term in of.terms
+        if (of.name, term.name) not in named
+    ]
+    return tuple(term for term in of.terms if (of.name, term.name) in named)
+
+
 def _pruned_variables(
     variables: Iterable[Variable],
     named: Collection[tuple[str, str]],
     removed: list[Removed],
     *,
     drops_inputs: bool,
+    keeps: bool = False,
 ) -> tuple[Variable, ...]:
-    """Leave out terms that are not named, then variables that are not used."""
+    """Leave out terms that are not named, then variables that are not used.
+
+    Where it `keeps` them, as formulas may read them, all variables stay.
+    """
     kept: list[Variable] = []
     for variable in variables:
-        terms = tuple(t for t in variable.terms if (variable.name, t.name) in named)
-        removed += [
-            Removed(f"term {term.name!r} of {variable.name!r}", "nothing names it")
-            for term in variable.terms
-            if (variable.name, term.name) not in named
-        ]
+        terms = _pruned_terms(variable, named, removed)
         kept.append(replace(variable, terms=terms))
     gone: set[str] = set()
-    for one, name in _idle_variables(kept):
+    for one, name in () if keeps else _idle_variables(kept):
         if drops_inputs or not one.changes:
             removed.append(one)
             gone.add(name)
@@ -391,8 +443,8 @@ def _pruned_sets(
 
 
 def proof_faults(
-    before: Model,
-    after: Model,
+    before: Document,
+    after: Document,
     *,
     uses: Collection[Use] = ("tree", "relative"),
     rules: Collection[int] = (),
@@ -414,20 +466,39 @@ def proof_faults(
         uses: What a tree serves.
         rules: For each rule of `after` its number in `before`; the same unless given.
     """
-    if before.classes != after.classes or before.semantics != after.semantics:
-        yield "classes or semantics differ"
     order = [name for name in before.inputs if name in set(after.inputs)]
     if list(after.inputs) != order:
         yield f"its inputs are {', '.join(after.inputs)}"
-    if isinstance(before, RuleBase) and isinstance(after, RuleBase):
-        yield from _rule_faults(before, after, rules)
-    elif isinstance(before, FuzzyTree) and isinstance(after, FuzzyTree):
-        yield from _tree_faults(before, after, uses)
-    else:
-        yield "one is a tree and the other a rule base"
+    match before, after:
+        case RuleBase(), RuleBase():
+            yield from _head_faults(before, after)
+            yield from _rule_faults(before, after, rules)
+        case FuzzyTree(), FuzzyTree():
+            yield from _head_faults(before, after)
+            yield from _tree_faults(before, after, uses)
+        case FuzzySystem(), FuzzySystem():
+            yield from _system_faults(before, after)
+        case _:
+            yield "the two are models of other kinds"
 
 
-def unguarded(before: Model, after: Model) -> tuple[str, ...]:
+def _head_faults(before: Model, after: Model) -> Iterator[str]:
+    if before.classes != after.classes or before.semantics != after.semantics:
+        yield "classes or semantics differ"
+
+
+def _system_faults(before: FuzzySystem, after: FuzzySystem) -> Iterator[str]:
+    """Compare programs, without the guards of the variables that are left out."""
+    kept = {variable.name for variable in after.variables}
+    variables = tuple(v for v in before.variables if v.name in kept)
+    one, two = (
+        program_of(system) for system in (replace(before, variables=variables), after)
+    )
+    if (one.steps, one.results) != (two.steps, two.results):
+        yield "its program has other steps"
+
+
+def unguarded(before: Document, after: Document) -> tuple[str, ...]:
     """Return the variables whose missing values only the first of two models sees.
 
     Where a combination stands, none of its inputs can be missing unseen: the weights
@@ -450,7 +521,7 @@ def unguarded(before: Model, after: Model) -> tuple[str, ...]:
     )
 
 
-def _axes(model: Model) -> dict[str, str | tuple[Part, ...]]:
+def _axes(model: Document) -> dict[str, str | tuple[Part, ...]]:
     """Return what each variable looks at: an input's name, or a chain of sums."""
     return {v.name: v.parts or v.name for v in model.variables}
 

@@ -483,14 +483,11 @@ def test_a_smaller_tolerance_gives_a_smaller_bound(call: Call) -> None:
     assert 0.0 < bounds[1] <= 1e-5 < bounds[0] <= 1e-2
 
 
-def test_verbs_for_classes_refuse_a_system_in_one_sentence(call: Call) -> None:
-    for verb in ("bench", "needs"):
-        code, out, err = call(verb, "tipper.fll")
-        assert (code, out) == (2, "")
-        assert err == (
-            "tipper is a fuzzy system, which decides for no class; "
-            f"{verb} takes a tree or a rule base\n"
-        )
+def test_needs_of_a_system_names_its_inputs(call: Call) -> None:
+    code, out, _ = call("needs", "tipper.fll")
+    assert code == 0
+    assert "model    fuzzy system, 3 rules, 8 terms" in out
+    assert "tipper: none of 2 comparisons disagrees" in out
 
 
 @pytest.mark.parametrize("seed", range(3))

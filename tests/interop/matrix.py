@@ -109,10 +109,6 @@ REASONS: tuple[tuple[str, str], ...] = (
         "must reference an input, but there is none",
         "these formats need a rule with an input, and a tree of one leaf tests nothing",
     ),
-    (
-        "which decides for no class; needs",
-        "not yet: what a system does not need is not reported",
-    ),
 )
 """Why a refusal is no hole: a part of its sentence, and the reason."""
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fuzzytree.model.contracts import Model
+from fuzzytree.checking.comparing import unequal
+from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -25,7 +27,9 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.model.tree import FuzzyTree, Use
+from fuzzytree.runtimes.native import load
 from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import system_probes
 from fuzzytree.semantics.satisfiability import always_holds, never_firing
 from fuzzytree.semantics.simplification import (
     USES,
@@ -36,7 +40,7 @@ from fuzzytree.semantics.simplification import (
     pruned,
     unguarded,
 )
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 
 SOFT = Term("soft", Band(high=1.0, right=2.0))
 FIRM = Term("firm", Band(low=1.0, high=4.0, left=0.0))
@@ -340,7 +344,7 @@ def test_every_pruned_model_is_proved(seed: int, uses: tuple[Use, ...]) -> None:
 # --- planted faults
 
 
-def _faults(before: Model, after: Model) -> list[str]:
+def _faults(before: Document, after: Document) -> list[str]:
     return list(proof_faults(before, after, uses=USES))
 
 
@@ -403,6 +407,29 @@ def test_a_tree_with_another_cut_leaf_or_set_is_found() -> None:
     ]
     bare = pruned(tree, uses=("tree", "relative")).model
     assert "node 1 is another node" in _faults(tree, bare)
-    assert _faults(tree, rules_from_tree(tree)) == [
-        "one is a tree and the other a rule base"
-    ]
+    assert _faults(tree, rules_from_tree(tree)) == ["the two are models of other kinds"]
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("inputs", [False, True])
+def test_a_pruned_system_has_the_same_program_and_numbers(
+    seed: int, inputs: bool
+) -> None:
+    system = random_system(seed)
+    left = pruned(system, inputs=inputs)
+    assert [*proof_faults(system, left.model)] == []
+    rows = system_probes(system, limit=40, seed=seed)
+    table = [[row[name] for row in rows] for name in system.inputs]
+    values = np.array(table, np.float64).reshape(len(system.inputs), len(rows))
+    values = values[:, np.isfinite(values).all(axis=0)]
+    kept = values[[system.inputs.index(name) for name in left.model.inputs]]
+    one, two = load(system)(values), load(left.model)(kept)
+    assert not unequal(one, two).any()
+
+
+def test_a_system_with_another_term_is_no_pruned_one() -> None:
+    system = random_system(1)
+    output = system.outputs[0]
+    other = replace(output, default=1.0 if output.default is None else None)
+    changed = replace(system, outputs=(other, *system.outputs[1:]))
+    assert [*proof_faults(system, changed)] == ["its program has other steps"]
