@@ -376,25 +376,31 @@ def equal_bits(results: Results, values: FloatArray) -> Allowance:
     return Allowance(nothing, nothing > 0.0, "equal bits")
 
 
-def by_libraries(program: Callable[[], Program]) -> Allow:
+def by_libraries(
+    program: Callable[[], Program],
+    bounds: Callable[[Program, FloatArray], FloatArray] = error_bounds,
+    cause: str = ORIGIN,
+    *,
+    edge: float = _EDGE,
+) -> Allow:
     """Allow what functions of libraries differ by: nothing where there are none.
 
-    A bound wider than a millionth of the largest number is counted apart: last bits
+    Other `bounds`, of shape (results, rows), are those of another `cause`. A bound
+    wider than a share of the largest number, the `edge`, is counted apart: last bits
     decide there, so near is an edge or a division by 0.
     """
 
     def allow(results: Results, values: FloatArray) -> Allowance:
         made = program()
-        bounds = error_bounds(made, values)
-        pairs = zip(made.results, bounds, strict=True)
+        pairs = zip(made.results, bounds(made, values), strict=True)
         bound_of = {(result.kind, result.name): bound for result, bound in pairs}
         amounts = equal_bits(results, values).amounts
         for line, key in enumerate(results.keys):
             amounts[line] = bound_of.get(key, 0.0)
         size = np.nan_to_num(np.abs(results.expected), posinf=0.0)
         largest = np.maximum(size.max(axis=1, initial=0.0, keepdims=True), _LEAST)
-        origin = ORIGIN if amounts.any() else "equal bits"
-        return Allowance(amounts, amounts > _EDGE * largest, origin)
+        origin = cause if amounts.any() else "equal bits"
+        return Allowance(amounts, amounts > edge * largest, origin)
 
     return allow
 

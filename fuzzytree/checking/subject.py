@@ -56,11 +56,13 @@ from fuzzytree.semantics import (
     Program,
     Row,
     Status,
+    float32_rounding,
     forms,
     probe_values,
     program_of,
     range_rows,
     rules_from_tree,
+    spreads,
     system_probes,
 )
 
@@ -68,6 +70,7 @@ GRID_LIMIT = 1 << 21
 """The most points at which all cells are tried one by one; the proof needs no limit."""
 
 _SLOW_STEPS = 8_000_000  # of a program, by a slow runtime
+_SINGLE_EDGE = 1e-3  # share of the largest number; a wider bound says little
 _FEW = 200  # probes of a coverage alone
 _AT_ONCE = 256  # rules that probes are aimed at, before it is seen which others fire
 _DRAWN = 1_000  # rows drawn from the ranges
@@ -218,6 +221,17 @@ class Subject:
                 yield compare_exact(actual, truth, self.rows, dtype=dtype)
 
 
+def single_bounds(program: Program, values: FloatArray) -> FloatArray:
+    """Return how far float32 can be from double, of shape (results, rows).
+
+    The `values` are of float32; a row with one that is not finite allows nothing.
+    """
+    every = spreads(program, values, values, float32_rounding(program))
+    count = values.shape[1]
+    ends = [np.broadcast_to(every[r.step].error * 1.0, count) for r in program.results]
+    return np.where(np.isfinite(values).all(axis=0), np.array(ends), 0.0)
+
+
 def _constant(bound: float, origin: str) -> Allow:
     """Allow the same difference of strengths in every row."""
 
@@ -229,6 +243,13 @@ def _constant(bound: float, origin: str) -> Allow:
 
 def rounding(model: Document, dtype: Dtype) -> Allow:
     """Allow what a number type can change, against double."""
+    if model.outputs:
+        return by_libraries(
+            lambda: program_of(model),
+            single_bounds,
+            "each step is rounded to float32",
+            edge=_SINGLE_EDGE,
+        )
     rules = cast("RuleBase", model)
     if not model.rules:
         if dtype != "float32":

@@ -160,11 +160,14 @@ def _is_rated(options: Options) -> bool:
     return options.get("probabilities") is True
 
 
+def _c_type(options: Options) -> c.Dtype:
+    return "float32" if options.get("dtype") == "float32" else "float64"
+
+
 def _c(
     content: bytes, model: Model, options: Options, values: FloatArray
 ) -> ProgramOutcome:
-    dtype: c.Dtype = "float32" if options.get("dtype") == "float32" else "float64"
-    name = cast("str | None", options.get("name"))
+    dtype, name = _c_type(options), cast("str | None", options.get("name"))
     run = c.load_content(content, model, dtype, prefix=beginning(model.name, name))
     return ProgramOutcome(run(values), None)
 
@@ -332,8 +335,9 @@ def system_numbers(
         case "c":
             is_fired = options.get("activations") is True
             prefix = beginning(system.name, cast("str | None", options.get("name")))
+            dtype = _c_type(options)
             run = c.load_system_content(
-                content, system, prefix=prefix, with_strengths=is_fired
+                content, system, dtype, prefix=prefix, with_strengths=is_fired
             )
             outcome = run(values)
             status = outcome.status.reshape(1, -1).astype(np.float64)

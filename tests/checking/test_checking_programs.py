@@ -343,6 +343,7 @@ SYSTEMS = {
 RUN: Sequence[Any] = (
     ("m.c", {}),
     ("m.c", {"activations": True, "name": "other"}),
+    ("m.c", {"dtype": "float32"}),
     ("m.mjs", {}),
     ("m.py", {}),
     ("m.sql", {}),
@@ -419,3 +420,15 @@ def test_a_slow_program_says_how_many_rows_it_left_out(
         if c.basis == "rows" and c.against == "the model"
     }
     assert rows == {"m.py": 150, "m.c": 300}
+
+
+def test_a_wrong_number_in_float32_is_noticed_beyond_its_bound() -> None:
+    system = SYSTEMS["Sugeno, linear"]
+    ft.save(system, "m.c", dtype="float32")
+    text = Path("m.c").read_text("utf-8")
+    right = "v0 - 0x1p+2f"
+    assert right in text
+    for wrong, verdict in (("v0 - 4.0000001f", "agrees"), ("v0 - 4.001f", "DISAGREES")):
+        Path("m.c").write_text(text.replace(right, wrong), "utf-8")
+        agreement = checked(system, "m.c", run_code=True)
+        assert about(agreement, "m.c")[1] == ("native", verdict)
