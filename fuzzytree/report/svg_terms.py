@@ -139,7 +139,7 @@ def draw_terms(model: Document) -> Picture:
     left = high = top = wide = 0.0
     variables: list[Variable | SystemOutput] = [*model.variables, *model.outputs]
     for axis, variable in zip(map(axis_of, variables), variables, strict=True):
-        if not axis.curves:
+        if not (axis.curves or axis.undrawn):
             continue
         notes = [axis.title, *_note_texts(variable, axis)]
         drawn = terms_picture(axis, None, f"v{len(marks)}")
@@ -148,7 +148,8 @@ def draw_terms(model: Document) -> Picture:
             for k, note in enumerate(notes, 1)
         ]
         below = _LINE * (len(notes) + 0.5)
-        words.append(mark("group", [drawn], move=f"translate(0 {below:.1f})"))
+        if axis.curves:
+            words.append(mark("group", [drawn], move=f"translate(0 {below:.1f})"))
         move = f"translate({left + _GAP:.0f} {top + _GAP:.0f})"
         marks.append(mark("group", words, move=move))
         high = max(high, top + below + _PANEL)

@@ -117,8 +117,8 @@ def pruned(
         The model that is left, and what is not.
 
     Raises:
-        ValueError: If a use is unknown or none is given, or if raw rules are wanted of
-            a tree without sets.
+        ValueError: If a use is unknown or none is given, if raw rules are wanted of a
+            tree without sets, or if rules of a fuzzy system are to be left out.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -133,6 +133,8 @@ def pruned(
         case RuleBase():
             return _pruned_rules(model, drops_inputs=inputs, drops_rules=rules)
         case FuzzySystem():
+            if rules:
+                raise ValueError("rules: those of a fuzzy system are not left out")
             return _pruned_system(model, drops_inputs=inputs)
 
 
