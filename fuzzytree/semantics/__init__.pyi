@@ -101,6 +101,6 @@ from .reference import row_probabilities as row_probabilities
 from .samples import all_samples as all_samples
 from .simplification import Pruned as Pruned
 from .simplification import Removed as Removed
-from .simplification import proof_faults as proof_faults
 from .simplification import pruned as pruned
-from .simplification import unguarded as unguarded
+from .simplification_proof import proof_faults as proof_faults
+from .simplification_proof import unguarded as unguarded

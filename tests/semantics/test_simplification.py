@@ -36,10 +36,9 @@ from fuzzytree.semantics.simplification import (
     Pruned,
     Removed,
     cannot_overflow,
-    proof_faults,
     pruned,
-    unguarded,
 )
+from fuzzytree.semantics.simplification_proof import proof_faults, unguarded
 from fuzzytree.testing import random_system, random_tree
 
 SOFT = Term("soft", Band(high=1.0, right=2.0))
