@@ -843,7 +843,7 @@ def needs(
     """Return what a model needs, and what leaving out the rest saves.
 
     Args:
-        model: A tree or a rule base; see `as_model`.
+        model: A tree, a rule base or a fuzzy system; see `as_model`.
         data: A table with rows of one's own, for the proof.
         uses: What a tree serves: its path, its `relative` rules, its `raw` rules.
         drop: Leave out `inputs` that nothing uses, or `rules` that never fire, too.

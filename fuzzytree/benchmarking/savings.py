@@ -41,7 +41,7 @@ class File(msgspec.Struct, frozen=True):
     """One file that a model makes.
 
     Attributes:
-        representation: `tree`, `relative rules`, `raw rules` or `rules`.
+        representation: `tree`, `relative rules`, `raw rules`, `rules` or `system`.
         format: Its name.
         dtype: The number type; None where the format has none.
         bytes: The size.
@@ -223,9 +223,9 @@ def _term_count(model: Document) -> int:
 def _files(
     model: Document, uses: Collection[Use], omissions: list[str]
 ) -> Iterator[File]:
-    yaml, python = find_format("yaml"), find_format("python")
+    names = ("yaml", "python", "c") if model.outputs else ("yaml", "python")
     for title, representation in forms(model, uses).items():
-        for form in (yaml, python):
+        for form in map(find_format, names):
             try:
                 written = form.write(representation)
             except LossError as error:

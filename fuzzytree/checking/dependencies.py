@@ -87,7 +87,7 @@ class Graph(msgspec.Struct, frozen=True):
     The causes are listed for `float64`; the other types differ by a cast.
 
     Attributes:
-        representation: `tree`, `relative rules`, `raw rules` or `rules`.
+        representation: `tree`, `relative rules`, `raw rules`, `rules` or `system`.
         dtype: The number type.
         contents: How large it is.
         because: What of it is there on account of what the model has.
@@ -109,17 +109,18 @@ class Needs(msgspec.Struct, frozen=True):
     Attributes:
         model: Its name.
         fingerprint: The SHA-256 of its content.
-        representation: Whether it is a tree or a rule base.
+        representation: Whether it is a tree, a rule base or a fuzzy system.
         columns: How many columns the training table had; None if unknown.
         inputs: The inputs that an answer depends on.
         idle_inputs: The inputs that matter only where their value is missing.
         combinations: The combinations that the model uses.
         terms: How many terms there are.
-        sets: How many fitted sets there are; 0 in a rule base.
+        sets: How many fitted sets there are; only a tree has them.
         rules: How many rules or leaves there are.
         idle: All that could go; what that would change is said with it.
         graphs: Its ONNX graphs, and what is in them for what.
         omissions: Why there is no graph, where there is none.
+        outputs: Those of a fuzzy system.
     """
 
     model: str
@@ -135,6 +136,7 @@ class Needs(msgspec.Struct, frozen=True):
     idle: tuple[Removed, ...]
     graphs: tuple[Graph, ...] = ()
     omissions: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
 
 
 def needs(model: Document, *, uses: Collection[Use] = ("tree", "relative")) -> Needs:
@@ -165,6 +167,7 @@ def needs(model: Document, *, uses: Collection[Use] = ("tree", "relative")) -> N
         idle=left.removed,
         graphs=graphs,
         omissions=omissions,
+        outputs=tuple(output.name for output in model.outputs),
     )
 
 
@@ -403,4 +406,4 @@ def _in_old_numbers(
         zeros = np.zeros((len(model.rules), outcome.rule.size))
         strengths = np.where(np.isnan(outcome.strengths[:1]), np.nan, zeros)
         strengths[np.array(numbers) - 1] = outcome.strengths
-    return Outcome(old, outcome.status, strengths)
+    return replace(outcome, rule=old, strengths=strengths)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.benchmarking import Cost, File, Footprint, Size, times_faster
 from fuzzytree.checking import Because, Graph, Needs
+from fuzzytree.model import ModelKind
 from fuzzytree.report.text import (
     agreement_lines,
     aligned,
@@ -64,12 +65,20 @@ def _verdict(footprint: Footprint) -> str:
     return f"{needs.model}: needs {len(needs.inputs)}{of}; {can}{agrees}"
 
 
+_KINDS: Mapping[ModelKind, tuple[str, str, str]] = {
+    "tree": ("fuzzy tree", "leaf", "leaves"),
+    "rules": ("rule base", "rule", "rules"),
+    "system": ("fuzzy system", "rule", "rules"),
+}
+"""What a kind of model is called, and what of it is counted: one, and several."""
+
+
 def _head(needs: Needs) -> Iterator[str]:
-    ends = ("leaf", "leaves") if needs.representation == "tree" else ("rule", "rules")
-    what = {"tree": "fuzzy tree", "rules": "rule base", "system": "fuzzy system"}
+    what, *ends = _KINDS[needs.representation]
     sizes = [counted(needs.rules, *ends), counted(needs.terms, "term")]
+    sizes += [counted(len(needs.outputs), "output")] if needs.outputs else []
     sizes += [counted(needs.sets, "fitted set")] if needs.sets else []
-    yield f"model    {what[needs.representation]}, {', '.join(sizes)}"
+    yield f"model    {what}, {', '.join(sizes)}"
     yield f"needs    {', '.join(needs.inputs) or 'no input'}"
     if needs.combinations:
         yield f"tests    {', '.join(needs.combinations)}"

@@ -15,10 +15,14 @@ Why an answer keeps its bits:
 - *A rule whose propositions never hold together* has strength 0 for every input, and a
   rule of strength 0 neither wins nor ties; but the rules behind it change their
   numbers.
-- *A term of a fuzzy system that no rule names* enters no step of its program: the
-  programs before and after are equal, step by step.
 - *An input that nothing uses* decides alone whether a row with a missing value is
   answered: leaving it out answers more rows.
+
+Of a fuzzy system the same terms go, and with them terms of outputs that no rule
+concludes or tests. Terms of an output with equal curves stay, for its conclusions are
+joined term by term, and so do all terms of a sampled output with a singleton, for each
+singleton is a sample. A rule of weight 0 is never activated. What is left has the steps
+of the whole system's program, and equal programs are equal bits for every input.
 """
 
 from __future__ import annotations
@@ -27,6 +31,7 @@ import functools
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from fractions import Fraction
 from functools import partial
+from typing import cast
 
 import msgspec
 from msgspec.structs import replace
@@ -34,22 +39,26 @@ from msgspec.structs import replace
 from fuzzytree.model import (
     Band,
     Branch,
+    Condition,
     Document,
     Formula,
     FuzzySystem,
     FuzzyTree,
     Linear,
+    Not,
     Part,
     Proposition,
     Rule,
     RuleBase,
     Sets,
-    Shape,
+    Singleton,
     SystemOutput,
     Term,
     Use,
     Value,
     Variable,
+    is_drawn_by_lines,
+    names_in,
     proposition_text,
     questions,
     shapes_of,
@@ -102,10 +111,9 @@ def pruned(
     stay: people and other tools read them, and no answer depends on them.
 
     Args:
-        model: A tree, a rule base or a fuzzy system; of a system terms that no rule
-            names, and where no formula can read them, variables without terms.
+        model: A tree, a rule base or a fuzzy system.
         uses: What a tree is to serve. Its fitted sets stay for `raw`, its flanks for
-            `relative`; its path needs the cuts alone. Without effect on a rule base.
+            `relative`; its path needs the cuts alone. Without effect on other models.
         inputs: Whether inputs that nothing uses go as well, and combinations that
             might overflow: rows in which only these are missing are then answered.
         rules: Whether rules that can never fire go as well: the rules behind them then
@@ -125,15 +133,13 @@ def pruned(
         ["the fitted sets of 'x1'"]
     """
     _check_uses(model, uses)
-    match model:
-        case FuzzyTree():
-            return _pruned_tree(model, uses, drops_inputs=inputs)
-        case RuleBase():
-            return _pruned_rules(model, drops_inputs=inputs, drops_rules=rules)
-        case FuzzySystem():
-            if rules:
-                raise ValueError("rules: those of a fuzzy system are not left out")
-            return _pruned_system(model, drops_inputs=inputs)
+    if model.outputs:
+        system = cast("FuzzySystem", model)
+        return _pruned_system(system, drops_inputs=inputs, drops_rules=rules)
+    if model.rules:
+        base = cast("RuleBase", model)
+        return _pruned_rules(base, drops_inputs=inputs, drops_rules=rules)
+    return _pruned_tree(cast("FuzzyTree", model), uses, drops_inputs=inputs)
 
 
 def _check_uses(model: Document, uses: Collection[Use]) -> None:
@@ -141,12 +147,9 @@ def _check_uses(model: Document, uses: Collection[Use]) -> None:
     if wrong or not uses:
         named = repr(wrong[0]) if wrong else "none"
         raise ValueError(f"uses: there is {', '.join(USES)}, not {named}")
-    if (
-        isinstance(model, FuzzyTree)
-        and "raw" in uses
-        and model.nodes
-        and not model.sets
-    ):
+    if model.rules or model.sets or "raw" not in uses:
+        return
+    if cast("FuzzyTree", model).nodes:
         raise ValueError(
             f"uses: tree {model.name!r} carries no fitted sets, so it has no raw rules"
         )
@@ -157,19 +160,8 @@ def _check_uses(model: Document, uses: Collection[Use]) -> None:
 
 def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> Pruned:
     removed: list[Removed] = []
-    dead = never_firing(rules) if drops_rules else {}
-    numbers = [n for n in range(1, len(rules.rules) + 1) if n not in dead]
-    numbers = numbers or [1]  # a rule base needs one
-    for number, why in dead.items():
-        if number not in numbers:
-            change = "the rules behind it have lower numbers"
-            removed.append(Removed(f"rule {number}", why, change))
-    same = {v.name: _same_curves(v.terms) for v in rules.variables}
-    removed += [
-        _duplicate(f"term {name!r} of {variable!r}", other)
-        for variable, names in same.items()
-        for name, other in names.items()
-    ]
+    numbers = _numbers_left(rules, never_firing(rules) if drops_rules else {}, removed)
+    same = _stand_ins(rules.variables, removed)
     is_min = rules.semantics.conjunction == "minimum"
     # Rules of a tree share their propositions, and these may name thousands of terms.
     renamed = functools.cache(partial(_renamed, same=same))
@@ -198,26 +190,18 @@ def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> 
     return Pruned(left, tuple(removed), tuple(numbers))
 
 
-def _pruned_system(system: FuzzySystem, *, drops_inputs: bool) -> Pruned:
-    named = {
-        (proposition.variable, term)
-        for rule in system.rules
-        for proposition in questions(rule.when)
-        for term in proposition.terms
-    }
-    named |= {(part.output, part.term) for rule in system.rules for part in rule.then}
-    removed: list[Removed] = []
-    outputs = tuple(
-        replace(output, terms=_pruned_terms(output, named, removed))
-        for output in system.outputs
-    )
-    every = [t.function for part in system.all_variables for t in part.terms]
-    reads = any(isinstance(function, Linear | Formula) for function in every)
-    variables = _pruned_variables(
-        system.variables, named, removed, drops_inputs=drops_inputs, keeps=reads
-    )
-    left = replace(system, variables=variables, outputs=outputs)
-    return Pruned(left, tuple(removed))
+def _numbers_left(
+    model: Document, dead: Mapping[int, str], removed: list[Removed]
+) -> list[int]:
+    """Return the numbers of the rules that stay: a model of rules needs one."""
+    numbers = [n for n in range(1, len(model.rules) + 1) if n not in dead] or [1]
+    change = "the rules behind it have lower numbers"
+    removed += [
+        Removed(f"rule {number}", why, change)
+        for number, why in dead.items()
+        if number not in numbers
+    ]
+    return numbers
 
 
 def _needed_propositions(
@@ -235,31 +219,45 @@ def _duplicate(where: str, other: str) -> Removed:
     return Removed(where, f"its curve is that of {other!r}, which stands in its place")
 
 
+def _stand_ins(
+    variables: Iterable[Variable], removed: list[Removed]
+) -> dict[str, dict[str, str]]:
+    """Return which terms of each variable others stand in for."""
+    same = {v.name: _same_curves(v.terms) for v in variables}
+    removed += [
+        _duplicate(f"term {name!r} of {variable!r}", other)
+        for variable, names in same.items()
+        for name, other in names.items()
+    ]
+    return same
+
+
 def _same_curves(terms: Iterable[Term]) -> dict[str, str]:
     """Return, for each term whose curve an earlier one has, that one's name."""
     first: dict[bytes, str] = {}
     same: dict[str, str] = {}
     for term in terms:
-        other = first.setdefault(curve_bytes(term.shape), term.name)
+        curve = curve_bytes((term.function, term.height))
+        other = first.setdefault(curve, term.name)
         if other != term.name:
             same[term.name] = other
     return same
 
 
-def curve_bytes(shape: Shape) -> bytes:
-    """Return what distinguishes curves: all numbers of a shape, the sign of 0 included.
+def curve_bytes(curve: object) -> bytes:
+    """Return what distinguishes curves: the bits of all their numbers.
 
     Example:
         >>> curve_bytes(Band(high=0.0)) == curve_bytes(Band(high=-0.0))
         False
     """
-    return msgspec.json.encode(shape)
+    return msgspec.msgpack.encode(curve)
 
 
 def _renamed(
     proposition: Proposition, same: Mapping[str, Mapping[str, str]]
 ) -> Proposition:
-    of = same[proposition.variable]
+    of = same.get(proposition.variable, {})  # none of an output
     if not of.keys() & set(proposition.terms):
         return proposition
     names = dict.fromkeys(of.get(name, name) for name in proposition.terms)
@@ -276,51 +274,58 @@ def _merged(
     ]
 
 
-def _pruned_terms(
-    of: Variable | SystemOutput,
-    named: Collection[tuple[str, str]],
-    removed: list[Removed],
-) -> tuple[Term, ...]:
-    """Return the terms that are named, and note the others."""
-    removed += [
-        Removed(f"term {term.name!r} of {of.name!r}", "nothing names it")
-        for term in of.terms
-        if (of.name, term.name) not in named
-    ]
-    return tuple(term for term in of.terms if (of.name, term.name) in named)
-
-
 def _pruned_variables(
     variables: Iterable[Variable],
     named: Collection[tuple[str, str]],
     removed: list[Removed],
     *,
     drops_inputs: bool,
-    keeps: bool = False,
 ) -> tuple[Variable, ...]:
-    """Leave out terms that are not named, then variables that are not used.
+    """Leave out terms that are not named, then variables that are not used."""
+    kept = [replace(v, terms=_named_terms(v, named, removed)) for v in variables]
+    return _used_variables(kept, removed, (), drops_inputs=drops_inputs)
 
-    Where it `keeps` them, as formulas may read them, all variables stay.
-    """
-    kept: list[Variable] = []
-    for variable in variables:
-        terms = _pruned_terms(variable, named, removed)
-        kept.append(replace(variable, terms=terms))
+
+def _used_variables(
+    kept: Collection[Variable],
+    removed: list[Removed],
+    used: Collection[str],
+    *,
+    drops_inputs: bool,
+) -> tuple[Variable, ...]:
+    """Leave out variables without terms that nothing else uses either."""
     gone: set[str] = set()
-    for one, name in () if keeps else _idle_variables(kept):
+    for one, name in _idle_variables(kept, used):
         if drops_inputs or not one.changes:
             removed.append(one)
             gone.add(name)
     return tuple(v for v in kept if v.name not in gone)
 
 
-def _idle_variables(variables: Iterable[Variable]) -> Iterator[tuple[Removed, str]]:
+def _named_terms(
+    variable: Variable | SystemOutput,
+    named: Collection[tuple[str, str]],
+    removed: list[Removed],
+) -> tuple[Term, ...]:
+    """Return the terms that something names."""
+    removed += [
+        Removed(f"term {term.name!r} of {variable.name!r}", "nothing names it")
+        for term in variable.terms
+        if (variable.name, term.name) not in named
+    ]
+    return tuple(t for t in variable.terms if (variable.name, t.name) in named)
+
+
+def _idle_variables(
+    variables: Iterable[Variable], names: Collection[str]
+) -> Iterator[tuple[Removed, str]]:
     """Yield each variable that nothing uses, with what leaving it out changes.
 
     An input that only idle combinations use is idle as well.
     """
     known = list(variables)
-    used = {part.input for v in known if v.terms for part in v.parts}
+    used = {p.input for v in known if v.terms or v.name in names for p in v.parts}
+    used.update(names)
     for variable in known:
         if variable.terms or variable.name in used:
             continue
@@ -356,6 +361,110 @@ def cannot_overflow(parts: Iterable[Part]) -> bool:
     return weights * (1 + Fraction(len(known) + 3, 2**22)) <= 1
 
 
+# --- fuzzy systems
+
+
+def _pruned_system(
+    system: FuzzySystem, *, drops_inputs: bool, drops_rules: bool
+) -> Pruned:
+    removed: list[Removed] = []
+    dead = never_activated(system) if drops_rules else {}
+    numbers = _numbers_left(system, dead, removed)
+    left = with_rules(system, numbers)
+    same = _stand_ins(system.variables, removed)
+    blocks = tuple(
+        replace(
+            block,
+            rules=tuple(replace(r, when=_reworded(r.when, same)) for r in block.rules),
+        )
+        for block in left.blocks
+    )
+    merged = tuple(_merged(system.variables, same))
+    left = with_named_terms(replace(left, variables=merged, blocks=blocks), removed)
+    curves = [term.function for v in left.all_variables for term in v.terms]
+    used = {one.variable for rule in left.rules for one in questions(rule.when)}
+    for curve in curves:
+        if isinstance(curve, Linear):
+            used.update(system.inputs)  # it has a weight for each
+        elif isinstance(curve, Formula):
+            used.update(names_in(curve.expression))
+    variables = _used_variables(
+        left.variables, removed, used, drops_inputs=drops_inputs
+    )
+    left = replace(left, variables=variables)
+    return Pruned(left, tuple(removed), tuple(numbers))
+
+
+def with_named_terms(
+    system: FuzzySystem, removed: list[Removed] | None = None
+) -> FuzzySystem:
+    """Return a system without the terms that no rule names, and that are no samples.
+
+    Args:
+        system: The system.
+        removed: Gets what is left out.
+    """
+    removed = [] if removed is None else removed
+    tests = [one for rule in system.rules for one in questions(rule.when)]
+    named = {(one.variable, term) for one in tests for term in one.terms}
+    named |= {(one.output, one.term) for rule in system.rules for one in rule.then}
+    outputs = tuple(
+        output
+        if _has_samples(output)
+        else replace(output, terms=_named_terms(output, named, removed))
+        for output in system.outputs
+    )
+    variables = tuple(
+        replace(v, terms=_named_terms(v, named, removed)) for v in system.variables
+    )
+    return replace(system, variables=variables, outputs=outputs)
+
+
+def _has_samples(output: SystemOutput) -> bool:
+    """Return whether terms of an output say where its range is looked at."""
+    is_weighted = output.defuzzifier.is_weighted
+    curves = [term.function for term in output.terms]
+    return not is_weighted and any(isinstance(one, Singleton) for one in curves)
+
+
+def never_activated(system: FuzzySystem) -> dict[int, str]:
+    """Return the rules that conclude nothing, by number, with the reason.
+
+    The grid `lines` joins its lines at every term that is concluded, at degree 0 too.
+    """
+    drawn = {one.name for one in system.outputs if is_drawn_by_lines(one)}
+    return {
+        number: "its weight is 0"
+        for number, rule in enumerate(system.rules, 1)
+        if rule.weight == 0.0 and drawn.isdisjoint(one.output for one in rule.then)
+    }
+
+
+def with_rules(system: FuzzySystem, numbers: Collection[int]) -> FuzzySystem:
+    """Return a system with some of its rules, and the blocks that still have one."""
+    order = iter(range(1, len(system.rules) + 1))
+    blocks = [
+        replace(b, rules=tuple(r for r in b.rules if next(order) in numbers))
+        for b in system.blocks
+    ]
+    return replace(system, blocks=tuple(block for block in blocks if block.rules))
+
+
+def _reworded(
+    when: Condition | None, same: Mapping[str, Mapping[str, str]]
+) -> Condition | None:
+    """Return a condition that names the terms that stand in for others."""
+    match when:
+        case None:
+            return None
+        case Proposition():
+            return _renamed(when, same)
+        case Not(part=part):
+            return replace(when, part=_reworded(part, same))
+        case _:
+            return replace(when, parts=tuple(_reworded(p, same) for p in when.parts))
+
+
 # --- trees
 
 
@@ -366,12 +475,7 @@ def _pruned_tree(
     variables = list(tree.variables)
     if "relative" not in uses:
         variables = _without_flanks(variables, removed)
-    same = {v.name: _same_curves(v.terms) for v in variables}
-    removed += [
-        _duplicate(f"term {name!r} of {variable!r}", other)
-        for variable, names in same.items()
-        for name, other in names.items()
-    ]
+    same = _stand_ins(variables, removed)
     sets, same_sets = _pruned_sets(tree, uses, removed)
 
     def left(variable: str, branch: Branch) -> Branch:

@@ -26,7 +26,7 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.report.needs import report_lines
 from fuzzytree.semantics.lowering import forms, rules_from_tree
 from fuzzytree.semantics.simplification import USES, Pruned, pruned
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 from tests.semantics.test_simplification import (
     ALL,
     FORCE,
@@ -322,3 +322,44 @@ def test_a_long_list_ends_with_a_count() -> None:
     rules = RuleBase("grip", ("a",), (variable,), (rule,))
     lines = list(report_lines(report(rules, pruned(rules))))
     assert "and 14 more parts; --verbose lists all" in lines
+
+
+# --- fuzzy systems
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_pruned_system_answers_the_same_bits(seed: int) -> None:
+    system = random_system(seed)
+    rules = [
+        replace(rule, weight=0.0 if place % 3 == 1 else rule.weight)
+        for place, rule in enumerate(system.rules)
+    ]
+    order = iter(rules)
+    blocks = [
+        replace(block, rules=tuple(next(order) for _ in block.rules))
+        for block in system.blocks
+    ]
+    system = replace(system, blocks=tuple(blocks))
+    for drops in (False, True):
+        left = pruned(system, inputs=drops, rules=drops)
+        proof = prove(system, left, limit=300)
+        assert proof.ok, [one.detail for one in proof.comparisons]
+        bases = [one.basis for one in proof.comparisons]
+        assert bases[:2] == ["proof", "rows"]
+
+
+def test_another_system_is_no_pruned_system() -> None:
+    system = random_system(3)
+    low, *others = system.outputs
+    changed = replace(system, outputs=(replace(low, default=0.125), *others))
+    proof = prove(system, Pruned(changed, ()), limit=300)
+    assert proof.comparisons[0].verdict == "DISAGREES"
+
+
+def test_the_needs_of_a_system_count_the_terms_of_its_outputs() -> None:
+    system = random_system(3)
+    result = needs(system)
+    assert result.outputs == ("y1", "y2")
+    assert result.rules == len(system.rules)
+    assert result.terms == sum(len(one.terms) for one in system.all_variables)
+    assert [one.representation for one in result.graphs] == ["system"]

@@ -11,6 +11,7 @@ import fuzzytree as ft
 from fuzzytree.checking import dependencies
 from fuzzytree.exporters.table import TABLE
 from fuzzytree.model.rulebase import Band, Term, Variable
+from fuzzytree.runtimes import Outputs
 from fuzzytree.semantics.simplification import Pruned, pruned
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
@@ -176,3 +177,69 @@ def test_without_onnx_the_rest_is_reported(
     assert code == 0
     assert "not reported: tree in float64: writing onnx needs the extra 'onnx'" in out
     assert "tree yaml" in out
+
+
+FAN = """format: fuzzytree/1
+kind: system
+name: fan
+variables:
+- {name: heat, range: {from: 0, to: 10}, terms: [{name: low, points: [[2, 1], [6, 0]]},
+   {name: faint, points: [[2, 1], [6, 0]]}, {name: high, points: [[3, 0], [8, 1]]}]}
+- {name: damp, range: {from: 0, to: 10}, terms: [{name: wet, points: [[3, 0], [9, 1]]}]}
+outputs:
+- {name: power, range: {from: 0, to: 30}, terms: [{name: small, triangle: [0, 5, 15]},
+   {name: large, triangle: [10, 25, 30]}, {name: huge, triangle: [20, 25, 30]}],
+   defuzzifier: centroid, samples: 100, grid: middle, aggregation: maximum}
+blocks:
+- {and: minimum, or: maximum, implication: minimum, activation: {method: general},
+   rules: [{if: [heat is faint], then: power is small},
+   {if: [damp is wet], then: power is huge, weight: 0},
+   {if: [heat is high or heat is low], then: power is large}]}
+semantics: {not: 1 - degree, activated: rules whose weighted degree is above 0,
+  missing: a value that is missing or infinite makes every output nan}
+"""
+
+
+def test_a_fuzzy_system_is_pruned_and_checks(call: Call) -> None:
+    Path("fan.yaml").write_text(FAN, encoding="utf-8")
+    code, out, err = call("needs", "fan.yaml", "-o", "left.yaml")
+    assert (code, err) == (
+        0,
+        "wrote    left.yaml next: fuzzytree check fan.yaml left.yaml\n",
+    )
+    lines = out.splitlines()
+    assert lines[:3] == [
+        "fan: needs 2 inputs; 1 part can be left out",
+        "model    fuzzy system, 3 rules, 7 terms, 1 output",
+        "needs    heat, damp",
+    ]
+    assert lines[4].startswith("term 'faint' of 'heat'  its curve is that of 'low'")
+    assert "rule 2                            its weight is 0" in out
+    words = ("check", "fan.yaml", "left.yaml", "--generate", "200", "--verbose")
+    code, out, _ = call(*words)
+    assert code == 0
+    assert "the model's rules" in out
+    rows = "heat,damp\n1,2\n4,9\n,1\n5.5,\n"
+    Path("rows.csv").write_text(rows, encoding="utf-8")
+    one, two = (ft.run(name, "rows.csv") for name in ("fan.yaml", "left.yaml"))
+    assert isinstance(one, Outputs)
+    assert isinstance(two, Outputs)
+    assert one.values.tobytes() == two.values.tobytes()
+    assert one.status.tolist() == two.status.tolist()
+
+
+def test_a_system_drops_rules_of_weight_0_and_their_inputs(call: Call) -> None:
+    Path("fan.yaml").write_text(FAN, encoding="utf-8")
+    words = "needs fan.yaml --drop rules --drop inputs -o less.yaml --json"
+    code, out, err = call(*words.split())
+    assert code == 0
+    assert err.startswith("wrote    less.yaml predicts some rows differently")
+    facts = json.loads(out)
+    assert (facts["ok"], facts["rules"]) == (True, [1, 3])
+    assert [one["where"] for one in facts["removed"] if one["changes"]] == [
+        "rule 2",
+        "input 'damp'",
+    ]
+    formats = [file["format"] for file in facts["sizes"][1]["files"]]
+    assert formats == ["yaml", "python", "c", "onnx"]
+    assert ft.load("less.yaml").inputs == ("heat",)
