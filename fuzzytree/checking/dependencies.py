@@ -150,7 +150,7 @@ def needs(model: Document, *, uses: Collection[Use] = ("tree", "relative")) -> N
         ValueError: As `pruned`.
     """
     used = pruned(model, uses=uses, inputs=True).model
-    left = pruned(model, uses=uses, inputs=True, rules=not model.outputs)
+    left = pruned(model, uses=uses, inputs=True, rules=True)
     graphs, omissions = _graphs(model)
     return Needs(
         model=model.name,

@@ -123,8 +123,8 @@ def pruned(
         The model that is left, and what is not.
 
     Raises:
-        ValueError: If a use is unknown or none is given, if raw rules are wanted of a
-            tree without sets, or if rules of a fuzzy system are to be left out.
+        ValueError: If a use is unknown or none is given, or if raw rules are wanted of
+            a tree without sets.
 
     Example:
         >>> from fuzzytree.testing import random_tree
