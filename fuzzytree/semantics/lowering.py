@@ -46,13 +46,13 @@ TITLES: Mapping[Use, Form] = {
 @overload
 def forms(
     model: FuzzyTree | RuleBase, uses: Iterable[Use] | None = None
-) -> dict[Form, FuzzyTree | RuleBase]: ...
+) -> Mapping[Form, FuzzyTree | RuleBase]: ...
 
 
 @overload
 def forms(
     model: Document, uses: Iterable[Use] | None = None
-) -> dict[Form, Document]: ...
+) -> Mapping[Form, Document]: ...
 
 
 def forms(
