@@ -143,10 +143,8 @@ COMMON = """\
 onnx written
 pmml written
 c written
-cannot write toy as sql: it carries tree or rules, and this is a fuzzy system; \
-fuzzytree.convert makes rules of it
-cannot write toy as python: it carries tree or rules, and this is a fuzzy system; \
-fuzzytree.convert makes rules of it
+sql written
+python written
 javascript written
 structured-text written
 {smt}
@@ -155,6 +153,8 @@ reference agrees
 native agrees
 onnxruntime float64 agrees
 onnxruntime float64 agrees
+python agrees
+python agrees
 c agrees
 c agrees
 audit names it: True
