@@ -1,16 +1,18 @@
 """Peers beside ours: what others would run for the same question, in the same study.
 
-A tree's cuts are carried over to trees of other libraries, a rule base's terms to
-fuzzy engines. Every peer answers rows with missing values, and those beyond its number
-type, in our code; its own code sees the others.
+A tree's cuts are carried over to trees of other libraries, a rule base's terms and a
+system to fuzzy engines. Every peer answers rows with missing values, and those beyond
+its number type, in our code; its own code sees the others.
 """
 
 from __future__ import annotations
 
 import importlib.util
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from ctypes.util import find_library
 from functools import partial
+from typing import Any
 
 import msgspec
 
@@ -35,35 +37,37 @@ _BARE = "missing values are not looked for within the call"
 _LINES = f"the strongest rule is taken by us: it has no word for ties; {_BARE}"
 
 
-class TreePeer(msgspec.Struct, frozen=True):
-    """A peer that follows a tree's path.
+class Peer(msgspec.Struct, frozen=True):
+    """A peer that follows a tree's path or runs a system.
 
     Attributes:
         name: As in the candidate's name.
         modules: What must be importable.
-        load: Prepares a tree for a number of threads.
+        load: Prepares a tree or a system for a number of threads.
         note: What a reader must know to compare it fairly.
         program: A program that it needs, if any.
+        library: A library of C or C++ that it needs, if any.
         is_parallel: Whether a second thread can make it faster.
     """
 
     name: str
     modules: tuple[str, ...]
-    load: Callable[[FuzzyTree, int], LoadedCandidate]
+    load: Callable[[Any, int], LoadedCandidate]
     note: str
     program: str | None = None
+    library: str | None = None
     is_parallel: bool = False
 
 
 TREE_PEERS = (
-    TreePeer("scikit-learn", ("sklearn",), trees.load_scikit_learn, _SINGLE),
-    TreePeer(
+    Peer("scikit-learn", ("sklearn",), trees.load_scikit_learn, _SINGLE),
+    Peer(
         "scikit-learn core",
         ("sklearn",),
         trees.load_scikit_learn_core,
         f"what predict calls behind its checks; {_SINGLE}; {_BARE}",
     ),
-    TreePeer(
+    Peer(
         "skl2onnx",
         ("sklearn", "skl2onnx", "onnx", "onnxruntime"),
         trees.load_skl2onnx,
@@ -71,20 +75,20 @@ TREE_PEERS = (
         f"{_BARE}",
         is_parallel=True,
     ),
-    TreePeer(
+    Peer(
         "treelite",
         ("treelite",),
         trees.load_treelite,
         f"its interpreter GTIL, in double; {_BARE}",
         is_parallel=True,
     ),
-    TreePeer(
+    Peer(
         "m2cgen python",
         ("sklearn", "m2cgen"),
         trees.load_m2cgen_python,
         f"its generated Python, in double; {_PYTHON}; {_BARE}",
     ),
-    TreePeer(
+    Peer(
         "m2cgen c",
         ("sklearn", "m2cgen"),
         trees.load_m2cgen_c,
@@ -94,7 +98,49 @@ TREE_PEERS = (
 )
 """Peers for the question `tree`."""
 
-_PACKAGES = {"sklearn": "scikit-learn", "fuzzylite": "--no-deps pyfuzzylite"}
+_MISSING = "rows with missing values are answered by us"
+SYSTEM_PEERS = (
+    Peer(
+        "pyfuzzylite",
+        ("fuzzylite",),
+        systems.load_fuzzylite,
+        f"the system as FLL; {_MISSING}",
+    ),
+    Peer(
+        "fuzzylite c++",
+        (),
+        systems.load_fuzzylite_cpp,
+        f"the system as FLL, in a loop of ours by g++ -O2; {_MISSING}",
+        program="g++",
+        library="fuzzylite",
+    ),
+    Peer(
+        "ferrifuzz",
+        ("ferrifuzz",),
+        systems.load_ferrifuzz,
+        f"on all cores, whatever the number of threads; {_MISSING}",
+    ),
+    Peer(
+        "simpful",
+        ("simpful",),
+        systems.load_simpful,
+        f"{_PYTHON}; curves that it lacks as points joined by lines; {_MISSING}",
+    ),
+    Peer(
+        "scikit-fuzzy",
+        ("skfuzzy", "scipy", "networkx"),
+        systems.load_scikit_fuzzy,
+        "degrees at points joined by lines; a weighted average is another number "
+        f"there, the centroid of spikes; {_MISSING}",
+    ),
+)
+"""Peers for the question `system`."""
+
+_PACKAGES = {
+    "sklearn": "scikit-learn",
+    "skfuzzy": "scikit-fuzzy",
+    "fuzzylite": "--no-deps pyfuzzylite",
+}
 """What pip calls the modules that have another name there."""
 
 
@@ -129,7 +175,7 @@ def peers(
             case FuzzyTree():
                 made, left = _of_tree(form)
             case FuzzySystem():
-                made, left = _of_system(form)
+                made, left = _of_table(form, SYSTEM_PEERS)
         for one in made:
             name = title(one.name, question)
             found.append(msgspec.structs.replace(one, name=name, question=question))
@@ -138,45 +184,35 @@ def peers(
 
 
 def _of_tree(tree: FuzzyTree) -> tuple[list[Candidate], list[Omission]]:
-    found: list[Candidate] = []
-    omitted: list[Omission] = []
-    for peer in TREE_PEERS:
-        why = _absent(peer.modules, peer.program)
-        if why or not tree.nodes:
-            omitted.append(Omission(peer.name, why or "the tree has no node"))
-            continue
-        note = peer.note
-        if any(variable.parts for variable in tree.variables):
-            note += "; combinations are computed by numpy within the call"
-        one = Candidate(
+    made, omitted = _of_table(tree, TREE_PEERS)
+    if not tree.nodes:
+        omitted += [Omission(peer.name, "the tree has no node") for peer in made]
+        made = []
+    if any(variable.parts for variable in tree.variables):
+        more = "; combinations are computed by numpy within the call"
+        made = [msgspec.structs.replace(one, note=one.note + more) for one in made]
+    return _with_evaluator(tree, lambda: None, made, omitted)
+
+
+def _of_table(
+    model: Document, table: Sequence[Peer]
+) -> tuple[list[Candidate], list[Omission]]:
+    """Return the peers of a table that are installed, and why the others are not."""
+    why = {peer: _absent(peer.modules, peer.program, peer.library) for peer in table}
+    made = [
+        Candidate(
             peer.name,
             "tree",
             "peer",
-            partial(peer.load, tree),
-            note=note,
+            partial(peer.load, model),
+            note=peer.note,
             modules=peer.modules,
             is_parallel=peer.is_parallel,
         )
-        found.append(one)
-    return _with_evaluator(tree, lambda: None, found, omitted)
-
-
-def _of_system(system: FuzzySystem) -> tuple[list[Candidate], list[Omission]]:
-    """Return the engines that read a system; the others take rule bases alone."""
-    elsewhere = "it reads no systems; benchmarks/engines.py builds some for it"
-    omitted = [Omission(name, elsewhere) for name in ("simpful", "scikit-fuzzy")]
-    why = _absent(("fuzzylite",))
-    if why:
-        return [], [Omission("pyfuzzylite", why), *omitted]
-    one = Candidate(
-        "pyfuzzylite",
-        "system",
-        "peer",
-        partial(systems.load_fuzzylite, system),
-        note="the system as FLL; rows with missing values are answered by us",
-        modules=("fuzzylite",),
-    )
-    return [one], omitted
+        for peer in table
+        if not why[peer]
+    ]
+    return made, [Omission(peer.name, text) for peer, text in why.items() if text]
 
 
 def _of_rules(
@@ -253,11 +289,15 @@ def _lines(
     return min(certified[0] + more, 1.0), f"{certified[1]}, and {origin}"
 
 
-def _absent(modules: tuple[str, ...], program: str | None = None) -> str:
+def _absent(
+    modules: tuple[str, ...], program: str | None = None, library: str | None = None
+) -> str:
     """Return what is not installed, and how to get it; nothing if all is there."""
     for module in modules:
         if importlib.util.find_spec(module) is None:
             return f"not installed (pip install {_PACKAGES.get(module, module)})"
     if program and shutil.which(program) is None:
         return f"the program {program!r} is not installed"
+    if library and find_library(library) is None:
+        return f"the library {library!r} is not installed"
     return ""

@@ -39,7 +39,13 @@ from fuzzytree.model import (
     kind_of,
 )
 from fuzzytree.numerics import ApproximateRules, by_degree, by_points, certify
-from fuzzytree.runtimes import all_runtimes, is_installed, needed_by, predictions_of
+from fuzzytree.runtimes import (
+    Predictions,
+    all_runtimes,
+    answers_of,
+    is_installed,
+    needed_by,
+)
 from fuzzytree.semantics import forms
 
 if TYPE_CHECKING:
@@ -185,9 +191,10 @@ def _found(
 
 def found_of(outcome: Outcome, model: Document) -> CandidateOutput:
     """Return a runtime's outcome as class numbers and strengths, or as outputs."""
-    if isinstance(model, FuzzySystem):
-        return CandidateOutput(outcome.status, None, outcome.outputs)
-    return CandidateOutput(predictions_of(outcome, model).codes, outcome.strengths)
+    answers = answers_of(outcome, model)
+    if isinstance(answers, Predictions):
+        return CandidateOutput(answers.codes, outcome.strengths)
+    return CandidateOutput(outcome.status, None, outcome.outputs)
 
 
 _GRAPHS = ("onnx", "onnxruntime")
@@ -466,7 +473,7 @@ def _bounds(values: FloatArray) -> Bounds:
     @functools.cache
     def bounds(rules: Document, dtype: Dtype) -> Bound | None:
         if isinstance(rules, FuzzySystem):
-            return output_bound(rules, values)
+            return output_bound(rules, values) if dtype == "float64" else None
         terms = sum(len(variable.terms) for variable in rules.variables)
         rows = max(_MOST_DEGREES // max(terms, 1), MOST_ROWS)
         certificate = certify(rules, dtype, values[:, :rows])

@@ -57,11 +57,16 @@ def error_of(point: Point) -> float | None:
 def entries(
     points: Sequence[Point], question: Question, rows: int, threads: int
 ) -> list[FrontEntry]:
-    """Return the points that can be compared, the fastest first."""
+    """Return the points that can be compared, the fastest first.
+
+    What was observed alone counts as no better than the least certified bound.
+    """
+    own = [one for one in points if one.question == question and one.kind != "floor"]
+    bounds = [one.error.bound for one in own if one.error and one.error.bound]
+    least = 0.0 if question == "tree" else min(bounds, default=0.0)
     comparable = [
-        FrontEntry(point, timing, error)
-        for point in points
-        if point.question == question and point.kind != "floor"
+        FrontEntry(point, timing, max(error, least))
+        for point in own
         if (error := error_of(point)) is not None
         for timing in point.timings
         if (timing.rows, timing.threads) == (rows, threads)

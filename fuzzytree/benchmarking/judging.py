@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
+from msgspec.structs import asdict, replace
 
 from fuzzytree.benchmarking.clock import TimeSource
 from fuzzytree.benchmarking.records import (
@@ -15,14 +16,15 @@ from fuzzytree.benchmarking.records import (
     CandidateOutput,
     Error,
     LoadedCandidate,
+    OutputError,
     Question,
 )
 from fuzzytree.model import (
+    BoolArray,
     Document,
     FloatArray,
     FuzzySystem,
-    Model,
-    Outcome,
+    IntArray,
     RuleBase,
 )
 from fuzzytree.numerics import Decisions, decide, strength_errors
@@ -36,6 +38,8 @@ from fuzzytree.semantics import (
     program_of,
     shape_of,
 )
+
+Record = TypeVar("Record", bound=msgspec.Struct)
 
 MOST_ROWS = 2_000
 """Rows on which errors are observed, of those that are timed."""
@@ -64,11 +68,23 @@ class CandidateJudgement(NamedTuple):
 
 
 class ExactSample(msgspec.Struct, frozen=True):
-    """Rows to judge on, and the exact answers to them: a system's, or classes."""
+    """Rows to judge on, and the exact answers to them.
+
+    Attributes:
+        model: What answers.
+        values: Shape (inputs, rows).
+        labels: The exact classes; of a fuzzy system the status of each row.
+        outputs: Those of a fuzzy system by its definition, of shape (outputs, rows).
+        bounds: How far each output can be from it in double, in its unit.
+        decisions: All that is exact about classes.
+    """
 
     model: Document
     values: FloatArray
-    exact: Decisions | Outcome
+    labels: IntArray
+    outputs: FloatArray | None = None
+    bounds: tuple[float, ...] = ()
+    decisions: Decisions | None = None
 
 
 class CandidateJudge:
@@ -127,110 +143,118 @@ class CandidateJudge:
             model = self.forms[question]
             edges = probe_values(model, min(MOST_PROBES, _most_rows(model)))
             self.samples[question] = (
-                _exact_sample(model, self.values),
-                _exact_sample(model, edges),
+                exact_sample(model, self.values),
+                exact_sample(model, edges),
             )
         return self.samples[question]
 
 
-def _exact_sample(model: Document, values: FloatArray) -> ExactSample:
+def exact_sample(model: Document, values: FloatArray) -> ExactSample:
     """Return rows with exact answers; those of a fuzzy system are the definition's."""
     if isinstance(model, FuzzySystem):
-        exact = definition().load(model, with_strengths=False)(values)
-        return ExactSample(model, values, exact)
-    return ExactSample(model, values, decide(model, values))
+        outcome = definition().load(model, with_strengths=False)(values)
+        bounds = tuple(output_bounds(model, values).tolist())
+        return ExactSample(model, values, outcome.status, outcome.outputs, bounds)
+    decisions = decide(model, values)
+    return ExactSample(model, values, decisions.label, decisions=decisions)
 
 
-def output_bound(system: FuzzySystem, values: FloatArray) -> tuple[float, str] | None:
-    """Return how far outputs can be from the definition's, as a share of their range.
+def output_bounds(model: Document, values: FloatArray) -> FloatArray:
+    """Return how far each output can be from the definition's, in its unit.
 
     It holds on the rows that candidates are judged on, of `values` of shape (inputs,
-    rows); None where last bits decide on one of them.
+    rows); infinity where last bits decide on one of them.
     """
-    rows = np.ascontiguousarray(values[:, : _most_rows(system)])
-    program = program_of(system, with_strengths=False)
-    allowed = error_bounds(program, rows)[: len(system.outputs)]
-    shares = allowed.max(axis=1, initial=0.0) / _spans(system)
+    rows = np.ascontiguousarray(values[:, : _most_rows(model)])
+    program = program_of(model, with_strengths=False)
+    bounds: FloatArray = error_bounds(program, rows)[: len(model.outputs)]
+    largest: FloatArray = bounds.max(axis=1, initial=0.0)
+    return largest
+
+
+def output_bound(model: Document, values: FloatArray) -> tuple[float, str] | None:
+    """Return the largest of these bounds as a share of the output's range."""
+    shares = output_bounds(model, values) / _spans(model)
     largest = float(shares.max(initial=0.0))
     return (largest, ORIGIN) if math.isfinite(largest) else None
 
 
-def _spans(system: FuzzySystem) -> FloatArray:
+def _spans(model: Document) -> FloatArray:
     """Return the width of each output's range; 1 where it declares none."""
-    pairs = [(output.low, output.high) for output in system.outputs]
+    pairs = [(output.low, output.high) for output in model.outputs]
     spans = [1.0 if a is None or b is None else b - a or 1.0 for a, b in pairs]
     return np.array(spans, np.float64)
-
-
-def _output_error(
-    output: CandidateOutput,
-    sample: ExactSample,
-    system: FuzzySystem,
-    bound: float | None,
-    origin: str,
-) -> Error:
-    exact, numbers = sample.exact, output.outputs
-    assert isinstance(exact, Outcome)
-    flips = output.labels != exact.status
-    known = np.zeros((0, 0)) if exact.outputs is None else exact.outputs
-    if numbers is None:
-        return Error(int(flips.size), None, bound, origin, int(flips.sum()))
-    with np.errstate(invalid="ignore"):
-        gap = np.abs(numbers - known)
-    gap[(numbers == known) | (np.isnan(numbers) & np.isnan(known))] = 0.0
-    gap[np.isnan(gap)] = np.inf
-    largest = gap.max(axis=1, initial=0.0)
-    names = [one.name for one in system.outputs]
-    return Error(
-        int(flips.size),
-        float((largest / _spans(system)).max(initial=0.0)),
-        bound,
-        origin,
-        int(flips.sum()),
-        outputs=dict(zip(names, largest.tolist(), strict=True)),
-    )
 
 
 def measured_error(
     output: CandidateOutput, sample: ExactSample, bound: float | None, origin: str
 ) -> Error:
     """Return how far the answers to a sample are from the exact ones."""
-    model, truth = sample.model, sample.exact
-    if isinstance(model, FuzzySystem):
-        return _output_error(output, sample, model, bound, origin)
-    assert isinstance(truth, Decisions)
-    flips = output.labels != truth.label
-    largest = band = margin = None
-    if isinstance(model, RuleBase):
-        if output.strengths is not None:
-            errors, _ = strength_errors(model, sample.values, output.strengths)
-            largest = float(errors.max(initial=0.0))
-        if bound is not None:
-            band = float((truth.margin <= 2.0 * bound).mean()) if flips.size else 0.0
-        if flips.any():
-            margin = float(truth.margin_high[flips].max())
+    outputs = _output_errors(output, sample, is_certified=bound is not None)
+    largest = max((one.share for one in outputs.values()), default=None)
+    flips = _flips(output, sample)
+    count = int(flips.sum())
+    error = Error(int(flips.size), largest, bound, origin, count, outputs=outputs)
+    model, truth = sample.model, sample.decisions
+    if truth is None or not isinstance(model, RuleBase):
+        return error
+    band = margin = None
+    if output.strengths is not None:
+        errors, _ = strength_errors(model, sample.values, output.strengths)
+        largest = float(errors.max(initial=0.0))
+    if bound is not None:
+        band = float((truth.margin <= 2.0 * bound).mean()) if flips.size else 0.0
+    if count:
+        margin = float(truth.margin_high[flips].max())
     lost, gained = _cover(output, model, truth)
-    return Error(
-        int(flips.size),
-        largest,
-        bound,
-        origin,
-        int(flips.sum()),
-        margin,
-        band,
-        lost,
-        gained,
+    return replace(
+        error,
+        largest=largest,
+        largest_flip_margin=margin,
+        in_band=band,
+        cover_lost=lost,
+        cover_gained=gained,
     )
 
 
-def _cover(output: CandidateOutput, model: Model, truth: Decisions) -> tuple[int, int]:
+def _flips(output: CandidateOutput, sample: ExactSample) -> BoolArray:
+    """Return in which rows the class or the status is another one."""
+    changed: BoolArray = output.labels != sample.labels
+    if output.outputs is not None and sample.outputs is not None:
+        is_other = np.isnan(output.outputs) != np.isnan(sample.outputs)
+        changed[output.labels < 0] = is_other.any(axis=0)[output.labels < 0]
+    return changed
+
+
+def _output_errors(
+    output: CandidateOutput, sample: ExactSample, *, is_certified: bool
+) -> dict[str, OutputError]:
+    """Return the error of each output; a number for none, or none for one, is inf."""
+    exact, numbers = sample.outputs, output.outputs
+    if exact is None or numbers is None:
+        return {}
+    with np.errstate(invalid="ignore"):
+        gap = np.abs(numbers - exact)
+    gap[(numbers == exact) | (np.isnan(numbers) & np.isnan(exact))] = 0.0
+    gap[np.isnan(gap)] = np.inf
+    largest = gap.max(axis=1, initial=0.0)
+    shares = largest / _spans(sample.model)
+    bounds = sample.bounds if is_certified else (None,) * len(largest)
+    names = [one.name for one in sample.model.outputs]
+    errors = map(OutputError, largest.tolist(), shares.tolist(), bounds)
+    return dict(zip(names, errors, strict=True))
+
+
+def _cover(
+    output: CandidateOutput, rules: RuleBase, truth: Decisions
+) -> tuple[int, int]:
     """Return how many rows lost and gained cover, as far as the answers show it."""
     strengths = output.strengths
     weighed = truth.status != Status.MISSING
     if strengths is not None:
         weighed = weighed & ~np.isnan(strengths).any(axis=0)
         is_covered = (strengths > 0.0).any(axis=0)
-    elif isinstance(model, RuleBase) and model.semantics.uncovered is None:
+    elif rules.semantics.uncovered is None:
         is_covered = output.labels >= 0
     else:
         return 0, 0
@@ -244,14 +268,23 @@ def _part(sample: ExactSample, most: int) -> ExactSample:
     step = -(-sample.values.shape[1] // most)
     if step <= 1:
         return sample
-    values = np.ascontiguousarray(sample.values[:, ::step])
+    decisions = sample.decisions
+    if decisions is not None:
+        decisions = _some_rows(decisions, step)
+    return replace(
+        _some_rows(sample, step),
+        values=np.ascontiguousarray(sample.values[:, ::step]),
+        decisions=decisions,
+    )
+
+
+def _some_rows(record: Record, step: int) -> Record:
     arrays = {
         name: array[..., ::step]
-        for name, array in msgspec.structs.asdict(sample.exact).items()
+        for name, array in asdict(record).items()
         if isinstance(array, np.ndarray)
     }
-    exact = msgspec.structs.replace(sample.exact, **arrays)
-    return ExactSample(sample.model, values, exact)
+    return replace(record, **arrays)
 
 
 def _most_rows(model: Document) -> int:

@@ -24,7 +24,7 @@ class CandidateOutput(msgspec.Struct, frozen=True):
 
     Attributes:
         labels: The class number of each row, -1 for no class; of a fuzzy system the
-            status of each row.
+            status of each row, -1 where the candidate returns none.
         strengths: Shape (rules, rows), or None where the candidate returns none.
         outputs: Shape (outputs, rows), of a fuzzy system.
     """
@@ -121,6 +121,20 @@ class Timing(msgspec.Struct, frozen=True):
     stolen: float | None = None
 
 
+class OutputError(msgspec.Struct, frozen=True):
+    """How far an output of a fuzzy system is from the definition's.
+
+    Attributes:
+        largest: The largest observed difference, in the output's unit.
+        share: The same as a share of the output's range; of 1 where it declares none.
+        bound: The derived bound of `largest`; None where there is none.
+    """
+
+    largest: float
+    share: float
+    bound: float | None = None
+
+
 class Error(msgspec.Struct, frozen=True):
     """How far a candidate is from the exact answer to its question.
 
@@ -131,13 +145,13 @@ class Error(msgspec.Struct, frozen=True):
             None where the candidate returns neither.
         bound: The certified bound of it; None where there is none.
         origin: Where the bound comes from, or why there is none.
-        flips: Rows whose class differs from the exact one, or whose status does in a
-            fuzzy system.
+        flips: Rows whose class differs from the exact one; in a fuzzy system those
+            whose status does, or, of a candidate without, which outputs have a number.
         largest_flip_margin: The largest exact margin of such a row.
         in_band: Share of rows whose exact margin is at most twice the bound.
         cover_lost: Rows that a rule covers exactly and none in the candidate.
         cover_gained: Rows that none covers exactly and one in the candidate.
-        outputs: The largest difference of each output of a fuzzy system, in its unit.
+        outputs: The error of each output of a fuzzy system.
     """
 
     rows: int
@@ -149,7 +163,7 @@ class Error(msgspec.Struct, frozen=True):
     in_band: float | None = None
     cover_lost: int = 0
     cover_gained: int = 0
-    outputs: dict[str, float] = {}
+    outputs: dict[str, OutputError] = {}
 
 
 class Point(msgspec.Struct, frozen=True):

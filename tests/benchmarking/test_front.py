@@ -54,6 +54,13 @@ def test_an_error_is_the_certified_one_where_there_is_one() -> None:
     assert error_of(FLOOR) is None
 
 
+def test_an_observed_error_is_no_better_than_the_least_certified_bound() -> None:
+    peer = point("a peer", 2000.0, error(1e-17), kind="peer")
+    ordered = entries([NATIVE, MIXED, peer], "rules", 1000, 1)
+    assert {one.name: one.error for one in ordered}[peer.name] == 1e-15
+    assert peer.name not in [one.name for one in front(ordered)]
+
+
 def test_a_trees_error_is_the_share_of_other_classes() -> None:
     tree = point("a", 1.0, error(None, flips=3), question="tree")
     assert error_of(tree) == 3 / 200

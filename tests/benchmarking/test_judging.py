@@ -6,10 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.benchmarking.judging import ExactSample, measured_error
+from fuzzytree.benchmarking.judging import exact_sample, measured_error
 from fuzzytree.benchmarking.records import CandidateOutput
 from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
-from fuzzytree.numerics.oracle import decide
 from fuzzytree.semantics.probing import probe_values
 from fuzzytree.testing import random_tree
 
@@ -25,7 +24,7 @@ def test_the_facts_of_answers_count_flips_band_and_cover() -> None:
     values = np.array([[0.0, 2.0, 3.0, 4.0]])
     given = np.array([[1.0, 0.75, 0.0, 0.125]])
     output = CandidateOutput(np.array([0, 0, -1, 0]), given)
-    sample = ExactSample(rules, values, decide(rules, values))
+    sample = exact_sample(rules, values)
     assert msgspec.structs.asdict(measured_error(output, sample, 0.2, "a guess")) == {
         "rows": 4,
         "largest": pytest.approx(1 / 3),
@@ -43,10 +42,9 @@ def test_the_facts_of_answers_count_flips_band_and_cover() -> None:
 def test_a_tree_has_flips_and_no_margins() -> None:
     tree = random_tree(0)
     values = probe_values(tree, 60)
-    exact = decide(tree, values)
-    labels = exact.label.copy()
+    sample = exact_sample(tree, values)
+    labels = sample.labels.copy()
     labels[0] = 1 if labels[0] == 0 else 0
-    sample = ExactSample(tree, values, exact)
     found = measured_error(CandidateOutput(labels), sample, None, "")
     assert (found.flips, found.largest_flip_margin, found.in_band) == (1, None, None)
     assert found.largest is None

@@ -35,7 +35,6 @@ from fuzzytree.benchmarking.study import (
     fitting,
     run_study,
 )
-from fuzzytree.model.contracts import Outcome
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes.native import load
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -551,12 +550,29 @@ def test_a_system_is_measured_in_each_runtime_that_runs_systems() -> None:
 def test_a_system_that_answers_otherwise_has_an_error() -> None:
     system = random_system(4, formulas="none", defuzzifier="of curves")
     values, _ = made_rows(system, 30)
-    sample = judging._exact_sample(system, values)
-    assert isinstance(sample.exact, Outcome)
-    assert sample.exact.outputs is not None
-    moved = sample.exact.outputs + 0.5
-    output = CandidateOutput(sample.exact.status, None, moved)
-    error = judging.measured_error(output, sample, 1e-9, "a test")
-    assert [*error.outputs.values()] == pytest.approx([0.5] * len(error.outputs))
-    assert error.largest is not None
-    assert error.largest > 1e-9
+    sample = judging.exact_sample(system, values)
+    assert sample.outputs is not None
+    moved = CandidateOutput(sample.labels, None, sample.outputs + 0.5)
+    error = judging.measured_error(moved, sample, 1e-9, "a test")
+    for output, bound in zip(system.outputs, sample.bounds, strict=True):
+        assert output.low is not None
+        assert output.high is not None
+        measured = error.outputs[output.name]
+        assert measured.largest == pytest.approx(0.5)
+        assert measured.share == pytest.approx(0.5 / (output.high - output.low))
+        assert measured.bound == bound
+    assert error.largest == max(one.share for one in error.outputs.values())
+
+
+def test_a_candidate_without_status_changes_rows_where_it_has_no_number() -> None:
+    system = random_system(4, formulas="none", defuzzifier="of curves")
+    sample = judging.exact_sample(system, made_rows(system, 30)[0])
+    assert sample.outputs is not None
+    numbers = sample.outputs.copy()
+    row = int(np.flatnonzero(np.isfinite(numbers).all(axis=0))[0])
+    numbers[0, row] = np.nan
+    output = CandidateOutput(np.full(30, -1), None, numbers)
+    error = judging.measured_error(output, sample, None, "")
+    assert error.flips == 1
+    first = error.outputs[system.outputs[0].name]
+    assert (first.largest, first.bound) == (math.inf, None)
