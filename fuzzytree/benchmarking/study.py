@@ -508,13 +508,17 @@ def faults(points: Sequence[Point]) -> Iterator[str]:
     """
     for point in points:
         error = point.error
-        if error is None or error.bound is None or error.largest is None:
+        if error is None:
             continue
-        if error.largest > error.bound:
-            yield (
-                f"{point.name}: an error of {error.largest:.2g} is larger than the "
-                f"certified {error.bound:.2g}; this is a fault"
-            )
+        parts = {point.name: (error.largest, error.bound)}
+        for name, one in error.outputs.items():
+            parts[f"{point.name}, output {name!r}"] = one.largest, one.bound
+        for name, (largest, bound) in parts.items():
+            if largest is not None and bound is not None and largest > bound:
+                yield (
+                    f"{name}: an error of {largest:.2g} is larger than the certified "
+                    f"{bound:.2g}; this is a fault"
+                )
 
 
 def _unsure(points: Sequence[Point]) -> Iterator[str]:

@@ -36,8 +36,8 @@ _LEGEND = (
     "* no candidate is both faster and more exact; +- the 95 % interval of the median;",
     "speed: times as fast as the default runtime; floor x: as reading the columns;",
     "error: the largest observed of a strength, or of an output as a share of its",
-    "range; certified: the bound of it; changed: classes (statuses of systems) other",
-    "than the exact ones; at edges: in rows on a cut",
+    "range (below outputs in its unit); certified: the bound of it; changed: classes",
+    "(statuses of systems) other than the exact ones; at edges: in rows on a cut",
 )
 
 
@@ -100,12 +100,28 @@ def _tables(study: Study) -> Iterator[str]:
         table = [*_table(study, rows, threads)]
         width = max(map(len, table))
         yield from aligned([(*row, *[""] * (width - len(row))) for row in table])
+    outputs = [*_outputs(study)]
+    if outputs:
+        yield ""
+        yield from aligned([("outputs", "error", "of range", "certified"), *outputs])
     if study.points:
         yield ""
         yield from _LEGEND
     yield from _section("left out", _grouped(study.omissions))
     yield from _section("doubtful", study.warnings)
     yield from _section("advice", study.advice)
+
+
+def _outputs(study: Study) -> Iterator[tuple[str, ...]]:
+    """Yield the largest error of each output: its own, in its unit, and as a share."""
+    for point in study.points:
+        for name, one in point.error.outputs.items() if point.error else ():
+            yield (
+                f"  {name}, {point.name.removesuffix(f': {point.question}')}",
+                f"{one.largest:.1e}",
+                f"{one.share:.1e}",
+                "-" if one.bound is None else f"{one.bound:.1e}",
+            )
 
 
 def machine_rows(machine: Machine) -> Iterator[tuple[str, str]]:

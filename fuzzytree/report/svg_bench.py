@@ -19,19 +19,21 @@ COLOURS: Mapping[Question, str] = {
     "relative rules": "#0072b2",
     "raw rules": "#00795a",
     "rules": "#0072b2",
+    "system": "#0072b2",
 }
 """Of forms of a model: the colour-blind can distinguish them; letters are readable."""
 
-Measure = Literal["strength", "class"]
+Measure = Literal["strength", "output", "class"]
 
 _TITLES: Mapping[Measure, tuple[str, str, str]] = {
     "strength": ("error of a strength", "(its certified bound, if any)", "exact"),
+    "output": ("error of an output, as a", "share of its range (or bound)", "exact"),
     "class": ("rows with", "another class", "none"),
 }
 """The label of each vertical axis, and the word for an error of 0."""
 
 _KINDS: tuple[Kind, ...] = ("runtime", "variant", "peer")  # a floor is a line
-_HIGH: Mapping[Measure, float] = {"strength": 300.0, "class": 200.0}
+_HIGH: Mapping[Measure, float] = {"strength": 300.0, "output": 300.0, "class": 200.0}
 _FLAT = 80.0  # the height of a panel in which all errors are 0
 _WIDE, _LEFT, _RIGHT, _TOP = 800.0, 92.0, 788.0, 58.0
 _GAP, _BELOW = 14.0, 66.0  # between panels, and for times and the legend
@@ -126,11 +128,11 @@ class Panel(NamedTuple):
 def work_precision(study: Study, *, rows: int, threads: int = 1) -> Picture:
     """Draw the error of every candidate against its time for one row.
 
-    Rules lie at the certified bound of their strengths, or at the largest observed
-    error where nothing is certified; a thin line leads from the bound down to what
-    was observed. Trees, and peers without strengths, lie at the share of rows whose
-    class is not the exact one. Both axes are logarithmic; an error of 0 lies on a
-    grey line of its own. Bars are 95 % intervals of the median.
+    Rules and systems lie at the certified bound of their strengths or outputs, or at
+    the largest observed error where nothing is certified; a thin line leads from the
+    bound down to what was observed. Trees, and peers without strengths, lie at the
+    share of rows whose class is not the exact one. Both axes are logarithmic; an error
+    of 0 lies on a grey line of its own. Bars are 95 % intervals of the median.
 
     Args:
         study: What was measured.
@@ -190,7 +192,7 @@ def marks_of(study: Study, rows: int, threads: int) -> list[Mark]:
         if point.error is None or not point.error.rows:
             continue
         error = error_of(point)
-        measure: Measure = "strength"
+        measure: Measure = "output" if point.question == "system" else "strength"
         if point.question == "tree" or error is None:
             measure, error = "class", point.error.flips / point.error.rows
         height = error if error <= 1.0 else 1.0  # NaN and infinity are drawn at 1

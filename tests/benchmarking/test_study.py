@@ -16,6 +16,7 @@ import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.benchmarking import judging, trial
 from fuzzytree.benchmarking.candidates import chosen, found_of, gather
@@ -26,6 +27,7 @@ from fuzzytree.benchmarking.records import (
     CandidateOutput,
     LoadedCandidate,
     Omission,
+    OutputError,
     Study,
 )
 from fuzzytree.benchmarking.study import (
@@ -39,6 +41,8 @@ from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes.native import load
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
+from tests.benchmarking.studies import error as error_by_hand
+from tests.benchmarking.studies import point
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray, Progress
@@ -534,12 +538,12 @@ def test_a_system_is_measured_in_each_runtime_that_runs_systems() -> None:
     system = random_system(4, formulas="none", defuzzifier="of curves")
     plan = BenchSettings(rows=(20,), threads=(1,), rounds=6, budget_s=20.0)
     study = bench(system, select=["native", "reference", "floor"], plan=plan)
-    points = {point.name: point for point in study.points}
+    points = {one.name: one for one in study.points}
     assert {"native: system", "reference: system"} <= set(points)
-    for point in points.values():
-        if point.kind == "floor":
+    for measured in points.values():
+        if measured.kind == "floor":
             continue
-        error = point.error
+        error = measured.error
         assert error is not None
         assert error.flips == 0
         assert set(error.outputs) == {output.name for output in system.outputs}
@@ -576,3 +580,12 @@ def test_a_candidate_without_status_changes_rows_where_it_has_no_number() -> Non
     assert error.flips == 1
     first = error.outputs[system.outputs[0].name]
     assert (first.largest, first.bound) == (math.inf, None)
+
+
+def test_an_output_beyond_its_own_bound_is_a_fault() -> None:
+    outputs = {"a": OutputError(1.0, 0.01, 2.0), "b": OutputError(1.0, 0.01, 0.5)}
+    wrong = replace(error_by_hand(0.01, 0.02), outputs=outputs)
+    assert [*faults([point("c", 9e4, wrong, question="system")])] == [
+        "c: system, output 'b': an error of 1 is larger than the certified 0.5; "
+        "this is a fault"
+    ]

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree import api
-from fuzzytree.benchmarking.records import Omission, Study
+from fuzzytree.benchmarking.records import Omission, OutputError, Study
 from fuzzytree.errors import install_hint
 from fuzzytree.report.bench import study_lines
 from fuzzytree.report.text import duration
@@ -48,6 +48,17 @@ def made() -> Study:
 def test_the_report_says_all_that_was_found() -> None:
     expected = (GOLDEN / "report.txt").read_text("utf-8")
     assert "\n".join(study_lines(made(), is_verbose=True)) + "\n" == expected
+
+
+def test_the_error_of_each_output_stands_in_its_unit_and_as_a_share() -> None:
+    outputs = {"fan": OutputError(0.5, 0.005, 0.75), "valve": OutputError(0.0, 0.0)}
+    fan = replace(error(0.005, 0.0075), outputs=outputs)
+    lines = study_lines(study(point("c", 9e4, fan, question="system")), is_verbose=True)
+    shown = [line.split() for line in lines if line.startswith(("  fan", "  valve"))]
+    assert shown == [
+        ["fan,", "c", "5.0e-01", "5.0e-03", "7.5e-01"],
+        ["valve,", "c", "0.0e+00", "0.0e+00", "-"],
+    ]
 
 
 def test_all_variants_are_listed_on_request() -> None:

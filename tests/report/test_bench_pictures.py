@@ -76,6 +76,17 @@ def signs(made: Study) -> dict[str, list[dict[str, str]]]:
     return groups
 
 
+def test_a_system_has_a_colour_and_the_error_of_its_outputs() -> None:
+    fan = study(
+        point("native", 1e5, error(1e-16, 1e-14), question="system"),
+        point("c", 2e5, error(1e-16, 1e-14), question="system"),
+    )
+    text = work_precision(fan, rows=1000).svg
+    assert "path.system.full, text.system { fill: #0072b2; }" in text
+    assert "error of an output, as a" in text
+    assert "error of a strength" not in text
+
+
 def words(made: Study, look: str = "", **options: int) -> list[Words]:
     """Return the texts of a picture, those of one look if any is named."""
     root = ET.fromstring(work_precision(made, **{"rows": 1000, **options}).svg)
