@@ -3,45 +3,33 @@
     python benchmarks/engines.py [--quick] [--write docs/reference/engines.md]
 
 Two systems: the tipper of examples/tipper.fll, and the relative rules of a tree with
-seven leaves and straight flanks, with a number for each rule. Every engine gets the
-same system; its numbers are compared with the reference's before it is timed. Calls are
-timed in interleaved rounds; C and C++ loop over rows themselves, so that no call of
-Python is counted.
+seven leaves and straight flanks, with a number for each rule. Both are measured by
+`fuzzytree bench` with the peers beside this file, in interleaved rounds.
 """
 
 from __future__ import annotations
 
 import argparse
-import ctypes
-import importlib
 import os
 import re
-import shutil
-import statistics
-import subprocess
-import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, cast
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import numpy as np
-import numpy.typing as npt
 from msgspec.structs import replace
+from peers.systems import load_fuzzylite_cpp
 
 import fuzzytree as ft
-from fuzzytree.benchmarking.clock import time_calls
-from fuzzytree.benchmarking.machine import load_averages, machine
+from fuzzytree.benchmarking import BenchSettings, Point, Study
+from fuzzytree.benchmarking.candidates import Layouts, load_runtime
+from fuzzytree.benchmarking.clock import time_calls, times_faster
+from fuzzytree.benchmarking.judging import made_rows
 from fuzzytree.model import (
     And,
     Conclusion,
-    Condition,
-    Curve,
     Defuzzifier,
     FuzzySystem,
-    Gaussian,
-    Or,
     Proposition,
     RuleBlock,
     Singleton,
@@ -52,33 +40,13 @@ from fuzzytree.model import (
     Variable,
 )
 from fuzzytree.model.rulebase import Band, RuleBase
+from fuzzytree.report.bench import machine_rows
 from fuzzytree.runtimes.table import find_runtime
-from fuzzytree.semantics.inference import curve_degree, infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 
 ROOT = Path(__file__).resolve().parents[1]
 ROWS = 10_000
-Floats = npt.NDArray[np.float64]
-Answer = Callable[[Floats], Floats]
-"""Answers to values of shape (inputs, rows): the first output of each row."""
-
-
-class Engine(NamedTuple):
-    """One way to run a system.
-
-    Attributes:
-        many: Answers a batch.
-        one: Answers one row; None where rows are looped over outside Python.
-        loop: Nanoseconds for all rows, one after another, in the engine's own language;
-            a figure for each round.
-        note: What is different.
-    """
-
-    many: Answer
-    one: Callable[[Sequence[float]], object] | None = None
-    loop: Callable[[Floats, int], list[int]] | None = None
-    note: str = ""
 
 
 def main() -> None:
@@ -87,52 +55,93 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer rounds")
     parser.add_argument("--write", metavar="FILE", help="a page with the tables")
     options = parser.parse_args()
-    rounds = 5 if options.quick else 15
-    with tempfile.TemporaryDirectory() as folder:
-        lines = list(_page(rounds, Path(folder)))
-    text = "\n".join(lines) + "\n"
+    text = "\n".join(_page(5 if options.quick else 15)) + "\n"
     print(text)
     if options.write:
         Path(options.write).write_text(_HEAD + text, encoding="utf-8")
 
 
-def _page(rounds: int, folder: Path) -> Iterator[str]:
-    names = ["numpy", "onnxruntime", "pyfuzzylite", "scikit-fuzzy", "simpful"]
-    found = machine([*names, "ferrifuzz"])
-    versions = ", ".join(
-        f"{name} {version}" for name, version in found.versions.items()
-    )
-    load = " ".join(f"{value:.2f}" for value in load_averages())
-    yield f"{found.python}, {versions}; fuzzylite of Debian, g++ and gcc -O2."
-    yield f"{found.processor}, {found.cores} cores; load at the start {load}."
+def _page(rounds: int) -> Iterator[str]:
     tipper = ft.load(ROOT / "examples" / "tipper.fll")
     if not isinstance(tipper, FuzzySystem):
         raise SystemExit("the tipper is read as something else")
     seven = seven_rules()
-    for title, system in (("The tipper", tipper), ("Seven rules", seven)):
+    settings = BenchSettings(
+        rows=(1, ROWS),
+        threads=(1,),
+        budget_s=60.0 * rounds,
+        rounds=rounds,
+        peers=str(Path(__file__).with_name("peers")),
+    )
+    studies = [ft.bench(system, settings=settings) for system in (tipper, seven)]
+    for name, fact in machine_rows(studies[0].machine):
+        yield f"- {name}: {fact}"
+    yield "- fuzzylite of Debian, g++ and gcc -O2"
+    for title, study in zip(("The tipper", "Seven rules"), studies, strict=True):
         yield f"\n## {title}\n"
-        yield from _table(system, rounds, folder)
+        yield from _table(study)
     yield ""
-    yield _decided(seven, rounds, folder)
+    yield from _decided(seven, rounds)
 
 
-def _decided(system: FuzzySystem, rounds: int, folder: Path) -> str:
+def _table(study: Study) -> Iterator[str]:
+    """Yield the rows of a table, the fastest for many rows first, and what to know."""
+    times = {
+        (point.name, timing.rows): timing.median_ns
+        for point in study.points
+        for timing in point.timings
+    }
+    many = [point for point in study.points if (point.name, ROWS) in times]
+    ours = [times[one.name, ROWS] for one in many if one.kind == "runtime"]
+    yield "| engine | one row, us | 10,000 rows, ms | times ours | largest difference |"
+    yield "| --- | ---: | ---: | ---: | ---: |"
+    for point in sorted(many, key=lambda one: times[one.name, ROWS]):
+        batch = times[point.name, ROWS]
+        yield (
+            f"| {_short(point)} | {times[point.name, 1] / 1e3:.3g} | {batch / 1e6:.3g} "
+            f"| {batch / min(ours):.2f} | {_difference(point)} |"
+        )
+    loops = [f"{name}: system" for name in ("c", "fuzzylite c++")]
+    if all((name, ROWS) in times for name in loops):
+        mine, other = (times[name, ROWS] for name in loops)
+        text = "Row after row, in a loop of C or C++, generated C is"
+        yield f"\n{text} {other / mine:.0f} times as fast as fuzzylite's C++."
+    yield ""
+    yield from (f"- {_short(one)}: {one.note}" for one in many if one.note)
+    yield from (f"- {one.name}: {one.why}" for one in study.omissions)
+
+
+def _short(point: Point) -> str:
+    return point.name.removesuffix(f": {point.question}")
+
+
+def _difference(point: Point) -> str:
+    if point.error is None:
+        return ""
+    largest = max(one.largest for one in point.error.outputs.values())
+    return f"{largest:.1e}" if largest else "0"
+
+
+def _decided(system: FuzzySystem, rounds: int) -> Iterator[str]:
     """Say what it costs in C to decide by the tree that the seven rules equal."""
     tree = random_tree(_seed(), leaves=7, combinations=0.0)
-    values = _values(system)
-    loop = _loop(ft.export(tree, "c", name="model").content + _TREE, folder / "tree.so")
+    values, _ = made_rows(tree, ROWS)
     right = find_runtime("reference").load(tree)(values).rule
-    if loop(values).tolist() != right.tolist():
+    decide = load_runtime(find_runtime("c"), tree, Layouts(), 1)
+    if not (find_runtime("c").load(tree)(values).rule == right).all():
         raise SystemExit("the tree in C decides otherwise")
-    mine = time_calls({"c": lambda: loop(values)}, rows=ROWS, rounds=rounds).timings[
-        "c"
-    ]
-    engine = _fuzzylite(system, folder)
-    others = statistics.median(engine.loop(values, rounds) if engine.loop else [0])
-    return (
+    calls = {
+        "tree": decide.call(values),
+        "rules": load_fuzzylite_cpp(system, 1).call(values),
+    }
+    timings = time_calls(calls, rows=ROWS, rounds=rounds).timings
+    ratio = times_faster(timings["rules"], timings["tree"])
+    if ratio is None:
+        raise SystemExit("the two share no round")
+    yield (
         "If you need the decision of these rules and not a number, use the tree that "
         "they equal,\nby proof and on all of these rows: in C "
-        f"{mine.median_ns / ROWS:.1f} ns a row, {others / mine.median_ns:.0f} times as "
+        f"{timings['tree'].median_ns / ROWS:.1f} ns a row, {ratio.median:.0f} times as "
         "fast as fuzzylite's C++ fires the rules."
     )
 
@@ -203,399 +212,6 @@ def _trapezoid(shape: object) -> Trapezoid:
 def _word(name: str) -> str:
     return re.sub(r"\W", "_", name)
 
-
-# --- the rows and the table
-
-
-def _values(system: FuzzySystem) -> Floats:
-    chance = np.random.default_rng(0)
-    columns = []
-    for one in system.variables:
-        marks = [m for label in one.terms for m in _marks(label.function)]
-        columns.append(chance.uniform(min(marks), max(marks), ROWS))
-    return np.array(columns)
-
-
-def _marks(curve: Curve) -> list[float]:
-    match curve:
-        case Trapezoid():
-            return [c for c in (curve.a, curve.b, curve.c, curve.d) if c is not None]
-        case Gaussian():
-            return [curve.mean - curve.deviation, curve.mean + curve.deviation]
-        case _:
-            return [0.0, 1.0]
-
-
-def _table(system: FuzzySystem, rounds: int, folder: Path) -> Iterator[str]:
-    values = _values(system)
-    rows = [dict(zip(system.inputs, row, strict=True)) for row in values.T.tolist()]
-    right = np.array([infer(system, row).outputs[0] for row in rows])
-    found: dict[str, Engine] = {}
-    absent: list[str] = []
-    for name, make in ENGINES.items():
-        try:
-            found[name] = make(system, folder)
-        except (ImportError, OSError, ValueError, subprocess.SubprocessError) as error:
-            absent.append(f"- {name}: {str(error).splitlines()[0]}")
-    errors = {
-        name: _error(engine.many(values), right) for name, engine in found.items()
-    }
-    first = [float(x) for x in values[:, 0]]
-    singles = {
-        name: (lambda one=engine.one: one(first))
-        for name, engine in found.items()
-        if engine.one is not None
-    }
-    batches = {
-        name: (lambda many=engine.many: many(values))
-        for name, engine in found.items()
-        if engine.loop is None
-    }
-    batches["reading the columns once"] = values.sum
-    one = {
-        name: timing.median_ns
-        for name, timing in time_calls(singles, rows=1, rounds=rounds).timings.items()
-    }
-    many = {
-        name: timing.median_ns
-        for name, timing in time_calls(
-            batches, rows=ROWS, rounds=rounds
-        ).timings.items()
-    }
-    for name, engine in found.items():
-        if engine.loop is not None:
-            many[name] = statistics.median(engine.loop(values, rounds))
-            one[name] = many[name] / ROWS
-    best = min(many[name] for name in OURS if name in many)
-    yield "| engine | one row, us | 10,000 rows, ms | times ours | largest difference |"
-    yield "| --- | ---: | ---: | ---: | ---: |"
-    for name in sorted(many, key=lambda n: many[n]):
-        single = f"{one[name] / 1e3:.3g}" if name in one else ""
-        gap = f"{errors[name]:.1e}" if name in errors else ""
-        if errors.get(name) == 0.0:
-            gap = "0"
-        yield (
-            f"| {name} | {single} | {many[name] / 1e6:.3g} | {many[name] / best:.2f} "
-            f"| {gap} |"
-        )
-    if "C, generated" in one and "fuzzylite, C++" in one:
-        ratio = one["fuzzylite, C++"] / one["C, generated"]
-        yield f"\nOne row: generated C is {ratio:.0f} times as fast as fuzzylite's C++."
-    notes = [f"- {name}: {e.note}" for name, e in found.items() if e.note]
-    if notes or absent:
-        yield ""
-        yield from [*notes, *absent]
-
-
-def _error(found: Floats, right: Floats) -> float:
-    both = np.isnan(found) & np.isnan(right)
-    return float(np.max(np.where(both, 0.0, np.abs(found - right))))
-
-
-# --- ours
-
-
-def _runtime(name: str) -> Callable[[FuzzySystem, Path], Engine]:
-    def make(system: FuzzySystem, _: Path) -> Engine:
-        run = find_runtime(name).load(system, with_strengths=False)
-
-        def many(values: Floats) -> Floats:
-            found: Floats = cast("Floats", run(values).outputs)[0]
-            return found
-
-        return Engine(many, lambda row: many(np.array(row)[:, None]))
-
-    return make
-
-
-def _c(system: FuzzySystem, folder: Path) -> Engine:
-    content = ft.export(system, "c", name="model").content
-    call = _loop(content + _SYSTEM, folder / f"{system.name}.so")
-
-    def timed(values: Floats, rounds: int) -> list[int]:
-        found = time_calls(
-            {"c": lambda: call(values)}, rows=ROWS, rounds=rounds
-        ).timings
-        return [int(found["c"].median_ns)]
-
-    return Engine(call, loop=timed, note="a loop over rows in C")
-
-
-def _loop(content: bytes, library: Path) -> Answer:
-    """Return a loop over rows in C, compiled from a file of ours and its loop."""
-    source = library.with_suffix(".c")
-    source.write_bytes(content)
-    compiler = shutil.which("gcc") or shutil.which("cc")
-    if compiler is None:
-        raise OSError("no C compiler is there")
-    words = [compiler, "-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC"]
-    subprocess.run([*words, source, "-o", library, "-lm"], check=True)
-    loop = ctypes.CDLL(str(library)).loop
-    loop.restype = None
-    pointer = ctypes.POINTER(ctypes.c_double)
-
-    def call(values: Floats) -> Floats:
-        rows = np.ascontiguousarray(values.T)
-        answers = np.empty(len(rows))
-        loop(
-            rows.ctypes.data_as(pointer),
-            ctypes.c_long(len(rows)),
-            ctypes.c_long(len(values)),
-            answers.ctypes.data_as(pointer),
-        )
-        return answers
-
-    return call
-
-
-_SYSTEM = b"""
-void loop(const double *rows, long count, long width, double *answers) {
-    long k;
-    for (k = 0; k < count; k++) {
-        double outputs[1];
-        model_infer(rows + k * width, outputs);
-        answers[k] = outputs[0];
-    }
-}
-"""
-
-_TREE = b"""
-void loop(const double *rows, long count, long width, double *answers) {
-    long k;
-    for (k = 0; k < count; k++)
-        answers[k] = (double)model_decide(rows + k * width).rule;
-}
-"""
-
-
-# --- third-party engines
-
-
-def _fuzzylite(system: FuzzySystem, folder: Path) -> Engine:
-    program, model = folder / "engines", folder / f"{system.name}.fll"
-    source = Path(__file__).with_suffix(".cpp")
-    if not program.exists():
-        words = ["g++", "-O2", "-w", str(source), "-o", str(program), "-lfuzzylite"]
-        subprocess.run(words, check=True, capture_output=True)
-    model.write_bytes(ft.export(system, "fll").content)
-
-    def call(values: Floats, rounds: int) -> tuple[list[int], Floats]:
-        rows, answers = folder / "rows.bin", folder / "answers.bin"
-        rows.write_bytes(np.ascontiguousarray(values.T).tobytes())
-        words = [str(program), str(model), str(rows), *map(str, values.shape)]
-        words += [str(rounds), str(answers)]
-        printed = subprocess.run(words, check=True, capture_output=True).stdout
-        return [int(line) for line in printed.split()], np.fromfile(answers)
-
-    return Engine(
-        lambda values: call(values, 1)[1],
-        loop=lambda values, rounds: call(values, rounds)[0],
-        note="a loop over rows in C++",
-    )
-
-
-def _pyfuzzylite(system: FuzzySystem, _: Path) -> Engine:
-    fuzzylite = importlib.import_module("fuzzylite")
-    text = ft.export(system, "fll").content.decode()
-    engine = fuzzylite.FllImporter().from_string(text)
-    output = engine.output_variables[0]
-
-    def many(values: Floats) -> Floats:
-        for variable, column in zip(engine.input_variables, values, strict=True):
-            variable.value = column
-        engine.process()
-        found: Floats = np.array(output.value, np.float64, ndmin=1)
-        return found
-
-    return Engine(many, lambda row: many(np.array(row)))
-
-
-def _ferrifuzz(system: FuzzySystem, _: Path) -> Engine:
-    ff = importlib.import_module("ferrifuzz")
-    made = ff.FuzzySystem(defuzz_method="weighted_average", clamp_inputs=False)
-    for one in system.variables:
-        low, high = _range(one)
-        variable = ff.Variable(one.name, low, high)
-        for label in one.terms:
-            match label.function:
-                case Gaussian(mean=mean, deviation=deviation):
-                    variable[label.name] = ff.mf.gaussian(mean, deviation)
-                case Trapezoid():
-                    corners = _corners(label.function, low, high)
-                    variable[label.name] = ff.mf.trapezoid(*corners)
-                case _:
-                    raise ValueError(f"no {type(label.function).__name__} there")
-        made.add_input(variable)
-    output = system.outputs[0]
-    variable = ff.Variable(output.name, output.low, output.high)
-    for name, value in _numbers(output):
-        variable[name] = ff.mf.singleton(value)
-    made.add_output(variable)
-    for rule in system.rules:
-        made.add_rule(_sentence(rule, " AND ", " OR ", "{} IS {}"))
-
-    def many(values: Floats) -> Floats:
-        given = dict(zip(system.inputs, values, strict=True))
-        found: Floats = np.asarray(made.compute_batch(given)[output.name])
-        return found
-
-    return Engine(many, made.evaluate, note="on all cores")
-
-
-def _simpful(system: FuzzySystem, _: Path) -> Engine:
-    sf = importlib.import_module("simpful")
-    made = sf.FuzzySystem(show_banner=False)
-    for one in system.variables:
-        low, high = _range(one)
-        sets = [_simpful_set(sf, label, low, high) for label in one.terms]
-        variable = sf.LinguisticVariable(sets, universe_of_discourse=[low, high])
-        made.add_linguistic_variable(one.name, variable)
-    output = system.outputs[0]
-    for name, value in _numbers(output):
-        made.set_crisp_output_value(name, value)
-    made.add_rules(
-        [
-            _sentence(rule, " AND ", " OR ", "({} IS {})", is_grouped=True)
-            for rule in system.rules
-        ]
-    )
-
-    def single(row: Sequence[float]) -> float:
-        for name, value in zip(system.inputs, row, strict=True):
-            made.set_variable(name, value)
-        found: float = made.Sugeno_inference([output.name])[output.name]
-        return found
-
-    def many(values: Floats) -> Floats:
-        return np.array([single(row) for row in values.T.tolist()])
-
-    return Engine(many, single, note="a loop over rows in Python")
-
-
-def _simpful_set(sf: Any, label: Term, low: float, high: float) -> Any:
-    if isinstance(label.function, Gaussian):
-        shape = sf.GaussianFuzzySet(
-            label.function.mean, label.function.deviation, label.name
-        )
-        return shape
-    if not isinstance(label.function, Trapezoid):
-        raise ValueError(f"no {type(label.function).__name__} there")
-    corners = _corners(label.function, low, high)
-    points = [[x, y] for x, y in zip(corners, (0.0, 1.0, 1.0, 0.0), strict=True)]
-    if corners[0] == corners[1]:
-        points = points[1:]
-    if corners[-1] == corners[-2]:
-        points = points[:-1]
-    return sf.FuzzySet(points=points, term=label.name)
-
-
-def _skfuzzy(system: FuzzySystem, _: Path) -> Engine:
-    control = importlib.import_module("skfuzzy.control")
-    inputs = {}
-    for one in system.variables:
-        low, high = _range(one)
-        knots = {m for label in one.terms for m in _marks(label.function)}
-        grid = np.unique([*np.linspace(low, high, 1001), *knots])
-        made = inputs[one.name] = control.Antecedent(grid, one.name)
-        for label in one.terms:
-            made[label.name] = np.array([curve_degree(label.function, x) for x in grid])
-    output = system.outputs[0]
-    universe = np.linspace(output.low or 0.0, output.high or 0.0, 301)
-    made = control.Consequent(universe, output.name)
-    for name, value in _numbers(output):
-        made[name] = (np.abs(universe - value) < 1e-9).astype(float)
-    rules = []
-    for rule in system.rules:
-        asked = _skfuzzy_condition(rule.when, inputs)
-        rules.append(control.Rule(asked, made[rule.then[0].term]))
-    simulation = control.ControlSystemSimulation(control.ControlSystem(rules))
-
-    def many(values: Floats) -> Floats:
-        for name, column in zip(system.inputs, values, strict=True):
-            simulation.input[name] = column
-        simulation.compute()
-        found: Floats = simulation.output[output.name]
-        simulation.reset()
-        return found
-
-    def single(row: Sequence[float]) -> object:
-        return many(np.array(row)[:, None])
-
-    note = "has no weighted average: the centroid of spikes, another number"
-    return Engine(many, single, note=note)
-
-
-def _skfuzzy_condition(condition: Condition | None, inputs: Mapping[str, Any]) -> Any:
-    match condition:
-        case Proposition(variable=variable, term=label):
-            return inputs[variable][label]
-        case And(parts=parts):
-            found = [_skfuzzy_condition(part, inputs) for part in parts]
-            total = found[0]
-            for one in found[1:]:
-                total = total & one
-            return total
-        case Or(parts=parts):
-            found = [_skfuzzy_condition(part, inputs) for part in parts]
-            total = found[0]
-            for one in found[1:]:
-                total = total | one
-            return total
-        case _:
-            raise ValueError("no such condition there")
-
-
-def _range(one: Variable) -> tuple[float, float]:
-    marks = [m for label in one.terms for m in _marks(label.function)]
-    low, high = min(marks), max(marks)
-    return low - (high - low), high + (high - low)
-
-
-def _corners(curve: Trapezoid, low: float, high: float) -> tuple[float, ...]:
-    a = low if curve.a is None else curve.a
-    b = low if curve.a is None else curve.b
-    c = high if curve.d is None else curve.c
-    d = high if curve.d is None else curve.d
-    return (a, b, c, d)
-
-
-def _numbers(output: SystemOutput) -> Iterator[tuple[str, float]]:
-    for label in output.terms:
-        if not isinstance(label.function, Singleton):
-            raise ValueError("only numbers are concluded there")
-        yield label.name, label.function.value
-
-
-def _sentence(
-    rule: SystemRule, both: str, either: str, question: str, *, is_grouped: bool = False
-) -> str:
-    def told(condition: Condition | None) -> str:
-        match condition:
-            case Proposition(variable=variable, term=label):
-                return question.format(variable, label)
-            case And(parts=parts):
-                text = both.join(map(told, parts))
-            case Or(parts=parts):
-                text = either.join(map(told, parts))
-            case _:
-                raise ValueError("no such condition there")
-        return f"({text})" if is_grouped and len(parts) > 1 else text
-
-    then = rule.then[0]
-    return f"IF {told(rule.when)} THEN {question.format(then.output, then.term)}"
-
-
-OURS = ("native", "onnxruntime", "C, generated")
-ENGINES: Mapping[str, Callable[[FuzzySystem, Path], Engine]] = {
-    "native": _runtime("native"),
-    "onnxruntime": _runtime("onnxruntime float64"),
-    "C, generated": _c,
-    "fuzzylite, C++": _fuzzylite,
-    "pyfuzzylite": _pyfuzzylite,
-    "ferrifuzz": _ferrifuzz,
-    "scikit-fuzzy": _skfuzzy,
-    "simpful": _simpful,
-}
 
 _HEAD = """\
 # Our runtimes beside third-party engines

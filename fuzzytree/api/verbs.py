@@ -455,7 +455,7 @@ def bench(
     """Measure error against run time for every way of running a model.
 
     Args:
-        model: A tree or a rule base, or the path of one.
+        model: A tree, a rule base or a fuzzy system, or the path of one.
         data: A table with rows to time and to judge on, repeated where there are too
             few; rows are made of the model's declared ranges if None.
         select: Names of candidates, such as `native`, questions, such as `raw rules`,
