@@ -339,10 +339,14 @@ def load_scikit_fuzzy(system: FuzzySystem, threads: int) -> LoadedCandidate:
     ]
     whole = control.ControlSystem(rules)
     used = {antecedent.label for antecedent in whole.antecedents}
-    of_rows = cache(lambda _rows: control.ControlSystemSimulation(whole))
+
+    @cache
+    def simulation_of(rows: int) -> Any:
+        """Return one for so many rows: it warns where their number changes."""
+        return control.ControlSystemSimulation(whole)
 
     def infer(values: FloatArray) -> FloatArray:
-        simulation = of_rows(values.shape[1])  # it warns of another number of rows
+        simulation = simulation_of(values.shape[1])
         for name, column in zip(system.inputs, values, strict=True):
             if name in used:
                 simulation.input[name] = column

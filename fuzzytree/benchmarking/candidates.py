@@ -264,11 +264,15 @@ TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 _MOST_TERMS = 400  # their points take seconds
 
-Make = Callable[[RuleBase], ApproximateRules]
+SAMPLES = (100, 50, 20, 10)
+"""At how many values a cheaper system looks at the curves of its outputs."""
+
+Make = Callable[[], tuple[Document, Bound | None]]
+"""Makes a cheaper model, with the bound of its difference where one is known."""
 
 
 def variants(model: Document, bounds: Bounds, layouts: Layouts) -> Candidates:
-    """Return the variants of each rule base that a model gives.
+    """Return the variants of each rule base that a model gives, or of a system.
 
     The arguments are those of `own`. A candidate's bound is known once it is loaded;
     what has too many terms is omitted. An approximation is made when it is first used.
@@ -282,22 +286,24 @@ def variants(model: Document, bounds: Bounds, layouts: Layouts) -> Candidates:
     candidates: list[Candidate] = []
     omitted: list[Omission] = []
     runtimes = [one for one in all_runtimes() if one.in_variants and is_installed(one)]
-    for question, rules in questions(model).items():
-        if not isinstance(rules, RuleBase):
-            continue
-        terms = sum(len(variable.terms) for variable in rules.variables)
-        if terms > _MOST_TERMS:
-            why = f"{terms:,} terms, and {_MOST_TERMS} are the most to approximate"
-            omitted.append(Omission(f"variants: {question}", why))
-            continue
-        for what, make in _makers(rules).items():
-            approximate = functools.cache(partial(make, rules))
+    for question, form in questions(model).items():
+        makers: Mapping[str, Make] = {}
+        if isinstance(form, RuleBase):
+            terms = sum(len(variable.terms) for variable in form.variables)
+            if terms > _MOST_TERMS:
+                why = f"{terms:,} terms, and {_MOST_TERMS} are the most to approximate"
+                omitted.append(Omission(f"variants: {question}", why))
+                continue
+            makers = _makers(form)
+        elif form.outputs:
+            makers = _fewer_samples(form)
+        for what, make in makers.items():
             candidates += (
                 Candidate(
                     title(f"{runtime.name}, {what}", question),
                     question,
                     "variant",
-                    partial(_load, runtime, approximate, bounds, layouts),
+                    partial(_load, runtime, functools.cache(make), bounds, layouts),
                     is_parallel=runtime.prepare is not None,
                 )
                 for runtime in runtimes
@@ -314,10 +320,43 @@ def _makers(rules: RuleBase) -> dict[str, Make]:
     makers: dict[str, Make] = {}
     if largest:
         for tolerance in TOLERANCES:
-            makers[f"points {tolerance:.0e}"] = partial(by_points, tolerance=tolerance)
+            change = partial(by_points, rules, tolerance)
+            makers[f"points {tolerance:.0e}"] = partial(_approximate, change)
     for degree in range(1, largest):
-        makers[f"degree {degree}"] = partial(by_degree, degree=degree)
+        change = partial(by_degree, rules, degree)
+        makers[f"degree {degree}"] = partial(_approximate, change)
     return makers
+
+
+def _approximate(
+    change: Callable[[], ApproximateRules],
+) -> tuple[Document, Bound | None]:
+    rules = change()
+    return rules.model, (rules.bound, rules.origin)
+
+
+def _fewer_samples(system: Document) -> dict[str, Make]:
+    """Return what makes a system look at the curves of its outputs at fewer values."""
+    ways = [one.defuzzifier for one in system.outputs]
+    most = max((one.samples for one in ways if not one.is_weighted), default=0)
+    return {
+        f"{count} samples": partial(_with_samples, system, count)
+        for count in SAMPLES
+        if count < most
+    }
+
+
+def _with_samples(system: Document, count: int) -> tuple[Document, Bound | None]:
+    outputs = tuple(
+        replace(
+            output,
+            defuzzifier=replace(
+                output.defuzzifier, samples=min(output.defuzzifier.samples, count)
+            ),
+        )
+        for output in system.outputs
+    )
+    return replace(system, outputs=outputs), None
 
 
 def _largest_degree(rules: RuleBase) -> int:
@@ -329,22 +368,20 @@ def _largest_degree(rules: RuleBase) -> int:
 
 def _load(
     runtime: Runtime,
-    approximate: Callable[[], ApproximateRules],
+    make: Make,
     bounds: Bounds,
     layouts: Layouts,
     threads: int,
 ) -> LoadedCandidate:
-    approximation = approximate()
-    loaded = load_runtime(runtime, approximation.model, layouts, threads)
+    model, difference = make()
+    loaded = load_runtime(runtime, model, layouts, threads)
 
     def bound() -> Bound | None:
-        certified = bounds(approximation.model, runtime.dtype)
-        if certified is None:
+        certified = bounds(model, runtime.dtype) if difference else None
+        if certified is None or difference is None:
             return None
-        error, origin = certified
-        return min(
-            approximation.bound + error, 1.0
-        ), f"{approximation.origin}, and {origin}"
+        largest = min(difference[0] + certified[0], 1.0)
+        return largest, f"{difference[1]}, and {certified[1]}"
 
     return replace(loaded, bound=bound)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.benchmarking.candidates import (
     READING,
@@ -21,19 +22,20 @@ from fuzzytree.benchmarking.candidates import (
     questions,
     variants,
 )
-from fuzzytree.benchmarking.judging import made_rows
+from fuzzytree.benchmarking.judging import exact_sample, made_rows, measured_error
 from fuzzytree.benchmarking.machine import after, machine, noise
 from fuzzytree.benchmarking.records import Candidate, Machine
 from fuzzytree.benchmarking.study import BenchSettings, bench, faults
 from fuzzytree.errors import install_hint
 from fuzzytree.model.contracts import Dtype, Outcome, Run, Runtime
 from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import Defuzzifier
 from fuzzytree.numerics import bounds
 from fuzzytree.runtimes.native import load
 from fuzzytree.runtimes.onnxruntime import prepare
 from fuzzytree.runtimes.table import all_runtimes, find_runtime, is_installed
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 from tests.benchmarking.studies import error, point, timing
 
 if TYPE_CHECKING:
@@ -146,6 +148,27 @@ def test_a_variant_tells_its_bound_once_it_is_loaded() -> None:
     assert bound is not None
     assert 1e-6 < bound[0] <= 1e-3 + 1e-15
     assert bound[1].endswith("lines within 0.001 of the curves, and doubles")
+
+
+def test_a_variant_of_a_system_looks_at_fewer_samples_without_a_bound() -> None:
+    system = random_system(4, formulas="none", defuzzifier="of curves")
+    output = system.outputs[0]
+    sampled = Defuzzifier("centroid", samples=60)
+    system = replace(
+        system,
+        outputs=(replace(output, defuzzifier=sampled), *system.outputs[1:]),
+    )
+    result, _ = variants(system, lambda _model, _dtype: (1e-15, "doubles"), Layouts())
+    named = {one.name: one for one in result}
+    coarse = named["native, 20 samples: system"]
+    assert "native, 100 samples: system" not in named
+    loaded = coarse.load(1)
+    assert loaded.bound is not None
+    assert loaded.bound() is None
+    sample = exact_sample(system, made_rows(system, 200)[0])
+    measured = measured_error(loaded.answer(sample.values), sample, None, "")
+    assert measured.largest is not None
+    assert 1e-6 < measured.largest < 0.5
 
 
 def test_a_rule_base_without_curves_has_no_variants() -> None:
