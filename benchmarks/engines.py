@@ -118,8 +118,11 @@ def _short(point: Point) -> str:
 def _difference(point: Point) -> str:
     if point.error is None:
         return ""
-    largest = max(one.largest for one in point.error.outputs.values())
-    return f"{largest:.1e}" if largest else "0"
+    numbers = [one.largest for one in point.error.outputs.values()]
+    sizes = [number for number in numbers if number is not None]
+    if len(sizes) < len(numbers):
+        return "other rows have numbers"
+    return f"{max(sizes):.1e}" if any(sizes) else "0"
 
 
 def _decided(system: FuzzySystem, rounds: int) -> Iterator[str]:

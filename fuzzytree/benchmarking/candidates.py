@@ -347,16 +347,12 @@ def _fewer_samples(system: Document) -> dict[str, Make]:
 
 
 def _with_samples(system: Document, count: int) -> tuple[Document, Bound | None]:
-    outputs = tuple(
-        replace(
-            output,
-            defuzzifier=replace(
-                output.defuzzifier, samples=min(output.defuzzifier.samples, count)
-            ),
-        )
-        for output in system.outputs
-    )
-    return replace(system, outputs=outputs), None
+    outputs = [*system.outputs]
+    for line, output in enumerate(outputs):
+        way = output.defuzzifier
+        fewer = replace(way, samples=min(way.samples, count))
+        outputs[line] = replace(output, defuzzifier=fewer)
+    return replace(system, outputs=tuple(outputs)), None
 
 
 def _largest_degree(rules: RuleBase) -> int:

@@ -191,7 +191,8 @@ def measured_error(
 ) -> Error:
     """Return how far the answers to a sample are from the exact ones."""
     outputs = _output_errors(output, sample, is_certified=bound is not None)
-    largest = max((one.share for one in outputs.values()), default=None)
+    shares = [math.inf if e.share is None else e.share for e in outputs.values()]
+    largest = max(shares, default=None)
     flips = _flips(output, sample)
     count = int(flips.sum())
     error = Error(int(flips.size), largest, bound, origin, count, outputs=outputs)
@@ -229,20 +230,25 @@ def _flips(output: CandidateOutput, sample: ExactSample) -> BoolArray:
 def _output_errors(
     output: CandidateOutput, sample: ExactSample, *, is_certified: bool
 ) -> dict[str, OutputError]:
-    """Return the error of each output; a number for none, or none for one, is inf."""
+    """Return the error of each output."""
     exact, numbers = sample.outputs, output.outputs
     if exact is None or numbers is None:
         return {}
     with np.errstate(invalid="ignore"):
         gap = np.abs(numbers - exact)
     gap[(numbers == exact) | (np.isnan(numbers) & np.isnan(exact))] = 0.0
-    gap[np.isnan(gap)] = np.inf
-    largest = gap.max(axis=1, initial=0.0)
-    shares = largest / _spans(sample.model)
-    bounds = sample.bounds if is_certified else (None,) * len(largest)
-    names = [one.name for one in sample.model.outputs]
-    errors = map(OutputError, largest.tolist(), shares.tolist(), bounds)
-    return dict(zip(names, errors, strict=True))
+    errors: dict[str, OutputError] = {}
+    spans = _spans(sample.model).tolist()
+    names = [result.name for result in sample.model.outputs]
+    for line, name in enumerate(names):
+        largest = float(np.max(gap[line], initial=0.0))
+        bound = sample.bounds[line] if is_certified else None
+        errors[name] = (
+            OutputError(largest, largest / spans[line], bound)
+            if math.isfinite(largest)
+            else OutputError(None, None, bound)
+        )
+    return errors
 
 
 def _cover(

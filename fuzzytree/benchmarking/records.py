@@ -125,13 +125,14 @@ class OutputError(msgspec.Struct, frozen=True):
     """How far an output of a fuzzy system is from the definition's.
 
     Attributes:
-        largest: The largest observed difference, in the output's unit.
+        largest: The largest observed difference, in the output's unit; None where in a
+            row one of the two has a number and the other none.
         share: The same as a share of the output's range; of 1 where it declares none.
         bound: The derived bound of `largest`; None where there is none.
     """
 
-    largest: float
-    share: float
+    largest: float | None
+    share: float | None
     bound: float | None = None
 
 

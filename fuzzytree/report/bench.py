@@ -118,9 +118,10 @@ def _outputs(study: Study) -> Iterator[tuple[str, ...]]:
         for name, one in point.error.outputs.items() if point.error else ():
             yield (
                 f"  {name}, {point.name.removesuffix(f': {point.question}')}",
-                f"{one.largest:.1e}",
-                f"{one.share:.1e}",
-                "-" if one.bound is None else f"{one.bound:.1e}",
+                *(
+                    "-" if number is None else f"{number:.1e}"
+                    for number in (one.largest, one.share, one.bound)
+                ),
             )
 
 

@@ -565,7 +565,7 @@ def test_a_system_that_answers_otherwise_has_an_error() -> None:
         assert measured.largest == pytest.approx(0.5)
         assert measured.share == pytest.approx(0.5 / (output.high - output.low))
         assert measured.bound == bound
-    assert error.largest == max(one.share for one in error.outputs.values())
+    assert error.largest == max(one.share or 0.0 for one in error.outputs.values())
 
 
 def test_a_candidate_without_status_changes_rows_where_it_has_no_number() -> None:
@@ -579,7 +579,8 @@ def test_a_candidate_without_status_changes_rows_where_it_has_no_number() -> Non
     error = judging.measured_error(output, sample, None, "")
     assert error.flips == 1
     first = error.outputs[system.outputs[0].name]
-    assert (first.largest, first.bound) == (math.inf, None)
+    assert (first.largest, first.share, first.bound) == (None, None, None)
+    assert error.largest == math.inf
 
 
 def test_an_output_beyond_its_own_bound_is_a_fault() -> None:
