@@ -12,7 +12,9 @@ import ctypes
 import itertools
 import subprocess
 import tempfile
+from contextlib import redirect_stdout
 from functools import cache, partial
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -249,7 +251,8 @@ def load_simpful(system: FuzzySystem, threads: int) -> LoadedCandidate:
                 case _:
                     raise LossError("simpful's Sugeno rules conclude numbers alone")
     words = Words(" AND ", " OR ", "(NOT {})", "({} IS {})", "((NOT ({} IS {})))")
-    made.add_rules([*_sentences(system, "simpful", words)], verbose=False)
+    with redirect_stdout(StringIO()):  # it prints which type it detected
+        made.add_rules([*_sentences(system, "simpful", words)], verbose=False)
     names = [output.name for output in system.outputs]
 
     def single(row: list[float]) -> list[float]:

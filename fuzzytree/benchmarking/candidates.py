@@ -320,19 +320,18 @@ def _makers(rules: RuleBase) -> dict[str, Make]:
     makers: dict[str, Make] = {}
     if largest:
         for tolerance in TOLERANCES:
-            change = partial(by_points, rules, tolerance)
-            makers[f"points {tolerance:.0e}"] = partial(_approximate, change)
+            make = partial(_approximate, by_points, rules, tolerance)
+            makers[f"points {tolerance:.0e}"] = make
     for degree in range(1, largest):
-        change = partial(by_degree, rules, degree)
-        makers[f"degree {degree}"] = partial(_approximate, change)
+        makers[f"degree {degree}"] = partial(_approximate, by_degree, rules, degree)
     return makers
 
 
 def _approximate(
-    change: Callable[[], ApproximateRules],
+    change: Callable[..., ApproximateRules], rules: RuleBase, size: float
 ) -> tuple[Document, Bound | None]:
-    rules = change()
-    return rules.model, (rules.bound, rules.origin)
+    changed = change(rules, size)
+    return changed.model, (changed.bound, changed.origin)
 
 
 def _fewer_samples(system: Document) -> dict[str, Make]:
@@ -374,7 +373,7 @@ def _load(
 
     def bound() -> Bound | None:
         certified = bounds(model, runtime.dtype) if difference else None
-        if certified is None or difference is None:
+        if not (certified and difference):
             return None
         largest = min(difference[0] + certified[0], 1.0)
         return largest, f"{difference[1]}, and {certified[1]}"

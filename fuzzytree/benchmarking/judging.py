@@ -167,9 +167,8 @@ def output_bounds(model: Document, values: FloatArray) -> FloatArray:
     """
     rows = np.ascontiguousarray(values[:, : _most_rows(model)])
     program = program_of(model, with_strengths=False)
-    bounds: FloatArray = error_bounds(program, rows)[: len(model.outputs)]
-    largest: FloatArray = bounds.max(axis=1, initial=0.0)
-    return largest
+    bounds = error_bounds(program, rows)[: len(model.outputs)]
+    return np.asarray(bounds.max(axis=1, initial=0.0))
 
 
 def output_bound(model: Document, values: FloatArray) -> tuple[float, str] | None:
