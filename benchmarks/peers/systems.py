@@ -238,20 +238,20 @@ def load_simpful(system: FuzzySystem, threads: int) -> LoadedCandidate:
         ]
         other = sf.LinguisticVariable(sets, universe_of_discourse=[low, high])
         made.add_linguistic_variable(variable.name, other)
-    for output in system.outputs if is_sugeno else ():
-        for term in output.terms:
-            match term.function:
-                case Singleton(value=value):
-                    made.set_crisp_output_value(term.name, value, verbose=False)
-                case Linear(weights=weights, offset=offset):
-                    parts = zip(system.inputs, weights, strict=True)
-                    text = "+".join(f"{weight!r}*{name}" for name, weight in parts)
-                    text = f"{text}+{offset!r}"
-                    made.set_output_function(term.name, text, verbose=False)
-                case _:
-                    raise LossError("simpful's Sugeno rules conclude numbers alone")
     words = Words(" AND ", " OR ", "(NOT {})", "({} IS {})", "((NOT ({} IS {})))")
     with redirect_stdout(StringIO()):  # it prints which type it detected
+        for output in system.outputs if is_sugeno else ():
+            for term in output.terms:
+                match term.function:
+                    case Singleton(value=value):
+                        made.set_crisp_output_value(term.name, value, verbose=False)
+                    case Linear(weights=weights, offset=offset):
+                        parts = zip(system.inputs, weights, strict=True)
+                        text = "+".join(f"{weight!r}*{name}" for name, weight in parts)
+                        text = f"{text}+{offset!r}"
+                        made.set_output_function(term.name, text, verbose=False)
+                    case _:
+                        raise LossError("simpful's Sugeno rules conclude numbers alone")
         made.add_rules([*_sentences(system, "simpful", words)], verbose=False)
     names = [output.name for output in system.outputs]
 
