@@ -238,6 +238,9 @@ def load_simpful(system: FuzzySystem, threads: int) -> LoadedCandidate:
         ]
         other = sf.LinguisticVariable(sets, universe_of_discourse=[low, high])
         made.add_linguistic_variable(variable.name, other)
+    names = [term.name for output in system.outputs for term in output.terms]
+    if is_sugeno and len({*names}) < len(names):
+        raise LossError("simpful's numbers have one name for all outputs")
     words = Words(" AND ", " OR ", "(NOT {})", "({} IS {})", "((NOT ({} IS {})))")
     with redirect_stdout(StringIO()):  # it prints which type it detected
         for output in system.outputs if is_sugeno else ():

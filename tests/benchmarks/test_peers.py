@@ -685,6 +685,31 @@ def test_an_engine_samples_the_curves_of_a_controller(
     assert np.isnan(outputs[:, 1]).all()
 
 
+@pytest.mark.parametrize(
+    "name", ["pyfuzzylite", "fuzzylite c++", "ferrifuzz", "simpful"]
+)
+def test_an_engine_concludes_linear_functions(name: str, tmp_path: Path) -> None:
+    start, _, end = MAMDANI.partition("  aggregation: Maximum\n")
+    rules = end[end.index("RuleBlock") :]
+    sugeno = "  aggregation: none\n  defuzzifier: WeightedAverage TakagiSugeno\n"
+    terms = "  term: slow Linear 1 -2 30\n  term: fast Linear -0.5 4 7.5\n"
+    file = tmp_path / "fan.fll"
+    text = (
+        start
+        + sugeno
+        + terms
+        + rules.replace("implication: Minimum", "implication: none")
+    )
+    file.write_text(text, "utf-8")
+    system = ft.read(file).model
+    values = inner_values(20)
+    outputs = candidate(system, f"{name}: system").load(1).answer(values).outputs
+    right = find_runtime("reference").load(system)(values).outputs
+    assert outputs is not None
+    assert right is not None
+    np.testing.assert_allclose(outputs, right, rtol=1e-9)
+
+
 @pytest.mark.parametrize("name", ["ferrifuzz", "simpful", "scikit-fuzzy"])
 def test_an_engine_refuses_what_it_has_no_word_for(name: str, tmp_path: Path) -> None:
     file = tmp_path / "fan.fll"
