@@ -137,6 +137,7 @@ def carry(
     *,
     options: Mapping[str, Option],
     notes: Sequence[tuple[str, str, str]] = (),
+    with_sizes: bool = False,
 ) -> int:
     """Write a model in another format, and report its proof; return 1 for a refusal.
 
@@ -148,6 +149,7 @@ def carry(
         chosen: The representation, the file to write and what to print.
         options: The options of the writer.
         notes: Lines to print behind those of the file and its proof.
+        with_sizes: Whether to print what the file, in C, needs on small machines.
     """
     from fuzzytree import report
     from fuzzytree.checking import export, in_dialect, proved
@@ -217,6 +219,7 @@ def carry(
         say_first(lines, verbose=chosen.verbose, quiet=chosen.quiet)
     if after:
         say(f"{label:<9}{after}{shows}", quiet=chosen.quiet)
+    sizes = _report_sizes(model, written) if with_sizes else None
     if chosen.as_json and chosen.output != "-":
         bound = proof.certificate
         answer_json(
@@ -233,6 +236,7 @@ def carry(
                 and {"sentence": bound.sentence, **msgspec.to_builtins(bound)},
                 "coverage": proof.coverage,
                 "next": after if label == "next" and after else None,
+                **({"report": sizes} if sizes else {}),
             }
         )
     return 0
@@ -272,6 +276,26 @@ def _refuse(found: Reading, refusal: str, *, verbose: bool) -> None:
     say_first(losses, verbose=verbose)
     if refusal:
         say("nothing is written; pass --allow-loss to write what remains")
+
+
+def _report_sizes(model: Document, written: Written) -> dict[str, object]:
+    """Print and return what a file of C needs on small machines."""
+    from fuzzytree.runtimes import MachineSize, machine_sizes
+    from fuzzytree.semantics import program_of
+
+    steps = program_of(model, with_strengths=False).size
+    say_rows(("steps", f"{steps:,}", "a row"))
+    sizes: list[MachineSize] = []
+    reasons: list[str] = []
+    for size in machine_sizes(written.content):
+        if not isinstance(size, MachineSize):
+            reasons.append(size)
+            say(f"size     {size}")
+            continue
+        sizes.append(size)
+        text = f"{size.flash:,} bytes of flash, {size.ram:,} of RAM, {size.stack:,}"
+        say_rows(("size", size.machine, f"{text} of stack"))
+    return {"steps": steps, "machines": sizes, "unmeasured": reasons}
 
 
 def _proof_row(proof: Proof) -> tuple[str, str, str]:

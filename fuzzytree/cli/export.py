@@ -9,8 +9,6 @@ from fuzzytree.cli.console import (
     model_argument,
     option,
     output_option,
-    say,
-    say_rows,
     takes,
     wrong_options,
 )
@@ -19,7 +17,7 @@ from fuzzytree.cli.representation import (
     WritingOptions,
     wanted_format,
 )
-from fuzzytree.model import Document, ModelPath
+from fuzzytree.model import ModelPath
 
 
 class ExportOptions(WritingOptions):
@@ -91,23 +89,12 @@ def command(options: ExportOptions) -> int:
             "--report is about a file of C; write one with -o FILE.c"
         )
     found, read_as = read_source(options.model, quiet=options.quiet)
-    code = carry(found, options.model, read_as, form, options, options=values)
-    if options.report and not code:
-        _report(found.model, options.output)
-    return code
-
-
-def _report(model: Document, path: str) -> None:
-    """Print what a file of C needs on small machines."""
-    from pathlib import Path
-
-    from fuzzytree.runtimes import MachineSize, machine_sizes
-    from fuzzytree.semantics import program_of
-
-    say_rows(("steps", f"{program_of(model, with_strengths=False).size:,}", "a row"))
-    for size in machine_sizes(Path(path).read_bytes()):
-        if not isinstance(size, MachineSize):
-            say(f"size     {size}")
-            continue
-        text = f"{size.flash:,} bytes of flash, {size.ram:,} of RAM, {size.stack:,}"
-        say_rows(("size", size.machine, f"{text} of stack"))
+    return carry(
+        found,
+        options.model,
+        read_as,
+        form,
+        options,
+        options=values,
+        with_sizes=options.report,
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import re
 import subprocess
 from collections.abc import Callable
@@ -331,8 +332,37 @@ def test_a_report_shows_what_the_compilers_say(
     program("arm-none-eabi-gcc")
     model, target = tmp_path / "fan.yaml", tmp_path / "fan.c"
     ft.save(fan(), model)
-    assert main(["export", str(model), "-o", str(target), "--report"]) == 0
+    words = ["export", str(model), "-o", str(target), "--report", "--json"]
+    assert main(words) == 0
     flash, stack = size_of(target.read_bytes(), "Cortex-M4")
+    shown = capsys.readouterr()
+    assert f"{flash:,} bytes of flash, 0 of RAM, {stack:,} of stack" in shown.err
+    report = json.loads(shown.out)["report"]
+    assert f"steps    {report['steps']:,}" in shown.err
+    machines = {one["machine"]: one for one in report["machines"]}
+    assert len(machines) + len(report["unmeasured"]) == len(MACHINES)
+    for name, size in machines.items():
+        compiler, *flags = MACHINES[name].split()
+        item = tmp_path / "fan.o"
+        subprocess.run([compiler, *flags, "-c", target, "-o", item], check=True)
+        tool = [compiler.replace("-gcc", "-size"), "-A", str(item)]
+        text = subprocess.run(tool, capture_output=True, text=True, check=True).stdout
+        sections = re.findall(r"^\.(text|rodata|data|bss)\S*\s+(\d+)", text, re.M)
+        pairs = [(kind, int(size)) for kind, size in sections]
+        assert size["flash"] == sum(n for kind, n in pairs if kind != "bss")
+        assert size["ram"] == sum(n for kind, n in pairs if kind in ("data", "bss"))
+
+
+def test_a_report_names_compilers_that_are_missing_and_other_formats(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, target = tmp_path / "fan.yaml", tmp_path / "fan.c"
+    ft.save(fan(), model)
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    assert main(["export", str(model), "-o", str(target), "--report"]) == 0
     shown = capsys.readouterr().err
-    assert f"{flash:,} bytes of flash, 0 of RAM, {stack:,} of stack" in shown
+    assert "size     Cortex-M0: arm-none-eabi-gcc is not installed" in shown
+    assert "size     ATmega328P: avr-gcc is not installed" in shown
     assert main(["export", str(model), "-o", str(tmp_path / "a.py"), "--report"]) == 2
+    assert "--report is about a file of C" in capsys.readouterr().err
+    assert not (tmp_path / "a.py").exists()
