@@ -57,7 +57,6 @@ from .probing import probe_values as probe_values
 from .probing import probes as probes
 from .probing import range_rows as range_rows
 from .probing import system_probes as system_probes
-from .programs.bounds import ARRAYS as ARRAYS
 from .programs.bounds import ORIGIN as ORIGIN
 from .programs.bounds import error_bounds as error_bounds
 from .programs.evaluate import StepValue as StepValue
@@ -70,6 +69,7 @@ from .programs.operations import OPERATIONS as OPERATIONS
 from .programs.operations import OVER_SAMPLES as OVER_SAMPLES
 from .programs.rule_program import from_axes as from_axes
 from .programs.rule_program import from_rules as from_rules
+from .programs.spreads import ARRAYS as ARRAYS
 from .programs.spreads import Rounding as Rounding
 from .programs.spreads import Spread as Spread
 from .programs.spreads import Worst as Worst

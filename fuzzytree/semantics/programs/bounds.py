@@ -12,21 +12,31 @@ With a conclusion that is cut off at a height, all samples at that height are co
 it, so that the mean of the maximum is certain. Copies of a number share its mark: 64
 bits that are mixed from where it comes from, of which two different ones are equal by
 chance once in 10^19.
+
+A number of a row is a box of no width, so what truths, sums and ends of two numbers do
+to errors is what they do on boxes (`spreads`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.semantics.programs.evaluate import still_results
 from fuzzytree.semantics.programs.operations import INEXACT, OPERATIONS
+from fuzzytree.semantics.programs.spreads import (
+    ARRAYS,
+    Array,
+    Spread,
+    combined,
+    of_truths,
+    times,
+)
 from fuzzytree.semantics.programs.steps import Program, Step
 
-Array = npt.NDArray[Any]
 Pair = tuple[Array, Array]
 """Values and the largest difference of two runners; of truths, whether it is unsure."""
 
@@ -50,53 +60,15 @@ graphs compute a cosine from a sine."""
 _SURELY_0 = -750.0
 """Below it e to a power is 0 in every library: half the least double is at -745.1."""
 
-ARRAYS: Mapping[str, Callable[..., Array]] = {
-    "add": np.add,
-    "subtract": np.subtract,
-    "multiply": np.multiply,
-    "divide": np.divide,
-    "minimum": np.minimum,
-    "maximum": np.maximum,
-    "negate": np.negative,
-    "absolute": np.absolute,
-    "floor": np.floor,
-    "ceiling": np.ceil,
-    "round": np.rint,
-    "square_root": np.sqrt,
-    "exponential": np.exp,
-    "logarithm": np.log,
-    "logarithm_10": np.log10,
-    "logarithm_1p": np.log1p,
-    "sine": np.sin,
-    "cosine": np.cos,
-    "tangent": np.tan,
-    "arc_sine": np.arcsin,
-    "arc_cosine": np.arccos,
-    "arc_tangent": np.arctan,
-    "hyperbolic_sine": np.sinh,
-    "hyperbolic_cosine": np.cosh,
-    "hyperbolic_tangent": np.tanh,
-    "area_sine": np.arcsinh,
-    "area_cosine": np.arccosh,
-    "area_tangent": np.arctanh,
-    "power": np.power,
-    "remainder": np.fmod,
-    "arc_tangent_2": np.arctan2,
-    "less": np.less,
-    "at_most": np.less_equal,
-    "equal": np.equal,
-    "is_finite": np.isfinite,
-    "and": np.logical_and,
-    "or": np.logical_or,
-    "not": np.logical_not,
-}
-"""The operations on arrays, but for those over samples, tables and `where`."""
-
 _COMPARISONS = frozenset(("less", "at_most", "equal"))
 _WAVES = frozenset(("sine", "cosine"))
 _UNROUNDED = frozenset(
     ("where", "minimum", "maximum", "negate", "absolute", "floor", "ceiling", "round")
 ) | {"below", "pick", "last", "highest", "lowest"}
+_OF_BOXES = frozenset(
+    ("add", "subtract", "minimum", "maximum", "negate", "absolute", "below")
+)
+"""Operations whose errors are those on boxes."""
 _ROUGH = frozenset(("tangent", "hyperbolic_cosine", "arc_tangent_2", "remainder"))
 """Functions of which nothing is known unless their arguments are the same."""
 
@@ -156,7 +128,8 @@ def _bounds(program: Program, values: npt.NDArray[np.float64]) -> list[Array]:
 
 def _pair(step: Step, operands: Sequence[Pair]) -> Pair:
     if step.kind == "truth":
-        return _truth(step.operation, operands)
+        truth = of_truths(step.operation, [_spread(one) for one in operands])
+        return truth.low, truth.error
     value, error = _number(step, operands)
     is_exact = np.ones(value.shape, np.bool_)
     for place, (_, other) in enumerate(operands):
@@ -218,20 +191,6 @@ def _own_error(operation: str, value: Array, operands: Sequence[Array]) -> Array
     return units
 
 
-def _truth(operation: str, operands: Sequence[Pair]) -> Pair:
-    (a, unsure_a), *others = operands
-    if operation == "not":
-        return ~a, unsure_a
-    if operation == "is_finite":
-        return np.isfinite(a), np.isinf(unsure_a)
-    ((b, unsure_b),) = others
-    if operation == "and":
-        unsure = (unsure_a & (b | unsure_b)) | (unsure_b & (a | unsure_a))
-        return a & b, unsure
-    unsure = (unsure_a & (~b | unsure_b)) | (unsure_b & (~a | unsure_a))
-    return a | b, unsure
-
-
 def _compared(operation: str, one: Pair, two: Pair, is_same: Array) -> Pair:
     """Compare; a number and its copy are equal, unless either may be NaN."""
     (a, error_a), (b, error_b) = one, two
@@ -251,18 +210,25 @@ def _number(step: Step, operands: Sequence[Pair]) -> Pair:
         value = ARRAYS[operation](*[one for one, _ in operands])
         unsure = sum(error for _, error in operands)
         return value, np.where(unsure == 0.0, 0.0, np.inf)
-    if step.table:
-        return _looked_up(step, *operands[0])
+    if operation in _OF_BOXES:
+        error = combined(step, [_spread(one) for one in operands]).error
+        if operation == "below":
+            return np.searchsorted(step.table, operands[0][0]).astype(np.float64), error
+        return ARRAYS[operation](*[one for one, _ in operands]), error
+    if operation == "pick":
+        return _picked(step, *operands[0])
     if operation in ("total", "running", "last", "highest", "lowest"):
         return _over_samples(operation, *operands[0])
     if operation == "where":
         return _where(*operands)
-    if operation in ("negate", "absolute"):
-        a, error = operands[0]
-        return (-a if operation == "negate" else np.abs(a)), error
     if len(operands) == 1:
         return _monotone(ARRAYS[operation], *operands[0])
     return _of_two(operation, *operands[0], *operands[1])
+
+
+def _spread(pair: Pair) -> Spread:
+    """Return a number as a box of no width."""
+    return Spread(pair[0], *pair)
 
 
 def _monotone(function: Callable[..., Array], a: Array, error: Array) -> Pair:
@@ -272,11 +238,8 @@ def _monotone(function: Callable[..., Array], a: Array, error: Array) -> Pair:
     return value, gap
 
 
-def _looked_up(step: Step, a: Array, error: Array) -> Pair:
+def _picked(step: Step, a: Array, error: Array) -> Pair:
     table = np.array(step.table)
-    if step.operation == "below":
-        low, high = np.searchsorted(table, a - error), np.searchsorted(table, a + error)
-        return np.searchsorted(table, a).astype(np.float64), (high - low) * 1.0
     place = np.where((a >= 0) & (a < len(table)), a, 0).astype(np.intp)
     widest = float(table.max() - table.min())
     return table[place], np.where(error == 0.0, 0.0, widest)
@@ -328,35 +291,16 @@ def _where(condition: Pair, one: Pair, two: Pair) -> Pair:
 def _of_two(operation: str, a: Array, error_a: Array, b: Array, error_b: Array) -> Pair:
     size_a, size_b = np.abs(a) + error_a, np.abs(b) + error_b
     match operation:
-        case "add":
-            return a + b, error_a + error_b
-        case "subtract":
-            return a - b, error_a + error_b
         case "multiply":
-            return a * b, _times(size_a, error_b) + _times(size_b, error_a)
+            return a * b, times(size_a, error_b) + times(size_b, error_a)
         case "divide":
             least = np.abs(b) - error_b
-            turned = error_a + _times(np.abs(a / b), error_b)
+            turned = error_a + times(np.abs(a / b), error_b)
             error = np.where(least > 0.0, turned / least, np.inf)
             fixed = np.where(error_a == 0.0, 0.0, error_a / np.abs(b))
             return a / b, np.where(error_b == 0.0, fixed, error)
-        case "minimum":
-            return np.minimum(a, b), _smaller_error(a, error_a, b, error_b)
-        case "maximum":
-            return np.maximum(a, b), _smaller_error(-a, error_a, -b, error_b)
         case _:
             return _power(a, error_a, b, error_b)
-
-
-def _smaller_error(a: Array, error_a: Array, b: Array, error_b: Array) -> Array:
-    """Return the error of the smaller number, the larger error where it is unsure."""
-    unsure = np.maximum(error_a, error_b)
-    second = np.where(b + error_b < a - error_a, error_b, unsure)
-    return np.where(a + error_a < b - error_b, error_a, second)
-
-
-def _times(size: Array, error: Array) -> Array:
-    return np.where(error == 0.0, 0.0, size * error)
 
 
 def _power(a: Array, error_a: Array, b: Array, error_b: Array) -> Pair:

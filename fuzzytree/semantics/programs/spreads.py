@@ -14,14 +14,58 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from fuzzytree.semantics.programs.bounds import ARRAYS, Array
 from fuzzytree.semantics.programs.evaluate import StepValue, still_results
 from fuzzytree.semantics.programs.operations import INEXACT
 from fuzzytree.semantics.programs.steps import Program, Step
+
+Array = npt.NDArray[Any]
+
+ARRAYS: Mapping[str, Callable[..., Array]] = {
+    "add": np.add,
+    "subtract": np.subtract,
+    "multiply": np.multiply,
+    "divide": np.divide,
+    "minimum": np.minimum,
+    "maximum": np.maximum,
+    "negate": np.negative,
+    "absolute": np.absolute,
+    "floor": np.floor,
+    "ceiling": np.ceil,
+    "round": np.rint,
+    "square_root": np.sqrt,
+    "exponential": np.exp,
+    "logarithm": np.log,
+    "logarithm_10": np.log10,
+    "logarithm_1p": np.log1p,
+    "sine": np.sin,
+    "cosine": np.cos,
+    "tangent": np.tan,
+    "arc_sine": np.arcsin,
+    "arc_cosine": np.arccos,
+    "arc_tangent": np.arctan,
+    "hyperbolic_sine": np.sinh,
+    "hyperbolic_cosine": np.cosh,
+    "hyperbolic_tangent": np.tanh,
+    "area_sine": np.arcsinh,
+    "area_cosine": np.arccosh,
+    "area_tangent": np.arctanh,
+    "power": np.power,
+    "remainder": np.fmod,
+    "arc_tangent_2": np.arctan2,
+    "less": np.less,
+    "at_most": np.less_equal,
+    "equal": np.equal,
+    "is_finite": np.isfinite,
+    "and": np.logical_and,
+    "or": np.logical_or,
+    "not": np.logical_not,
+}
+"""The operations on arrays, but for those over samples, tables and `where`."""
 
 _LIPSCHITZ: Mapping[str, float] = {
     "sine": 1.0,
@@ -46,6 +90,9 @@ class Spread(NamedTuple):
     low: Array
     high: Array
     error: Array
+
+    def __neg__(self) -> Spread:
+        return Spread(-self.high, -self.low, self.error)
 
     @property
     def size(self) -> Array:
@@ -123,8 +170,10 @@ def _moving(
     step = program.steps[place]
     operands = [every[one] for one in step.arguments]
     if step.kind == "truth":
+        if step.operation not in ("less", "at_most", "equal"):
+            return of_truths(step.operation, operands)
         is_same = len(set(step.arguments)) == 1
-        return _truth(step.operation, operands, is_same=is_same)
+        return _compared(step.operation, *operands, is_same=is_same)
     number = _number(program, every, step)
     if step.operation not in ("total", "running"):
         return _rounded(place, number, rounding)
@@ -148,31 +197,28 @@ def _rounded(
     return Spread(low, np.where(np.isnan(high) & ~is_none, np.inf, high), error)
 
 
-def _truth(operation: str, operands: list[Spread], *, is_same: bool) -> Spread:
-    if operation in ("less", "at_most", "equal"):
-        return _compared(operation, *operands, is_same=is_same)
-    if operation == "is_finite":
-        (a,) = operands
-        is_finite = np.isfinite(a.low) & np.isfinite(a.high)
-        is_never = a.is_none | (np.isinf(a.low) & (a.low == a.high))
-        return Spread(is_finite, ~is_never, np.isinf(a.error))
-    if operation == "not":
-        (a,) = operands
-        return Spread(~a.high, ~a.low, a.error)
-    a, b = operands
-    if operation == "and":
-        unsure = (a.error & (b.high | b.error)) | (b.error & (a.high | a.error))
-        return Spread(a.low & b.low, a.high & b.high, unsure)
-    unsure = (a.error & (~b.low | b.error)) | (b.error & (~a.low | a.error))
-    return Spread(a.low | b.low, a.high | b.high, unsure)
+def of_truths(operation: str, operands: Sequence[Spread]) -> Spread:
+    """Return what `is_finite`, `not`, `and` or `or` is."""
+    a, b = operands[0], operands[-1]
+    match operation:
+        case "is_finite":
+            is_finite = np.isfinite(a.low) & np.isfinite(a.high)
+            is_never = a.is_none | (np.isinf(a.low) & (a.low == a.high))
+            return Spread(is_finite, ~is_never, np.isinf(a.error))
+        case "not":
+            return Spread(~a.high, ~a.low, a.error)
+        case "and":
+            unsure = (a.error & (b.high | b.error)) | (b.error & (a.high | a.error))
+            return Spread(a.low & b.low, a.high & b.high, unsure)
+        case _:
+            unsure = (a.error & (~b.low | b.error)) | (b.error & (~a.low | a.error))
+            return Spread(a.low | b.low, a.high | b.high, unsure)
 
 
 def _compared(operation: str, a: Spread, b: Spread, *, is_same: bool) -> Spread:
     """Compare; nothing is less than, or equal to, what is no number."""
     both = a.error + b.error
-    is_none = (np.isnan(a.low) & np.isnan(a.high)) | (
-        np.isnan(b.low) & np.isnan(b.high)
-    )
+    is_none = a.is_none | b.is_none
     match operation:
         case "less":
             low, high = a.high < b.low, a.low < b.high
@@ -194,19 +240,32 @@ def _compared(operation: str, a: Spread, b: Spread, *, is_same: bool) -> Spread:
 
 def _number(program: Program, every: list[Spread], step: Step) -> Spread:
     """Return a number before it is rounded."""
-    operation = step.operation
-    operands = [every[place] for place in step.arguments]
-    if operation in ("add", "subtract", "multiply", "minimum", "maximum"):
-        return _of_two(operation, *operands)
-    if operation == "divide":
-        return _mean(program, every, step, _quotient(*operands))
-    if operation == "where":
-        return _where(*operands)
-    a = operands[0]
+    number = combined(step, [every[place] for place in step.arguments])
+    is_quotient = step.operation == "divide"
+    return _mean(program, every, step, number) if is_quotient else number
+
+
+def combined(step: Step, operands: Sequence[Spread]) -> Spread:
+    """Return what an operation makes of numbers before it is rounded."""
+    operation, a, b = step.operation, operands[0], operands[-1]
     low, high, error = a
     match operation:
+        case "add":
+            return Spread(low + b.low, high + b.high, error + b.error)
+        case "subtract":
+            return Spread(low - b.high, high - b.low, error + b.error)
+        case "multiply":
+            return _product(a, b)
+        case "divide":
+            return _quotient(a, b)
+        case "minimum":
+            return _smaller(a, b)
+        case "maximum":
+            return -_smaller(-a, -b)
+        case "where":
+            return _where(*operands)
         case "negate":
-            return Spread(-high, -low, error)
+            return -a
         case "absolute":
             least = np.maximum(np.maximum(low, -high), 0.0)
             return Spread(least, np.maximum(-low, high), error)
@@ -248,34 +307,27 @@ def _number(program: Program, every: list[Spread], step: Step) -> Spread:
             return Spread(-nothing, nothing, nothing)
 
 
-def _of_two(operation: str, a: Spread, b: Spread) -> Spread:
-    match operation:
-        case "add":
-            return Spread(a.low + b.low, a.high + b.high, a.error + b.error)
-        case "subtract":
-            return Spread(a.low - b.high, a.high - b.low, a.error + b.error)
-        case "multiply":
-            ends = [x * y for x in (a.low, a.high) for y in (b.low, b.high)]
-            ends = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0 infinity
-            is_none = a.is_none | b.is_none
-            low, high = np.minimum.reduce(ends), np.maximum.reduce(ends)
-            exact = np.maximum(np.abs(b.low), np.abs(b.high))
-            error = _times(a.size, b.error) + _times(exact, a.error)
-            low = np.where(is_none, np.nan, low)
-            return Spread(low, np.where(is_none, np.nan, high), error)
-        case "minimum":
-            error = np.maximum(a.error, b.error)
-            error = np.where(b.high + b.error < a.low - a.error, b.error, error)
-            error = np.where(a.high + a.error < b.low - b.error, a.error, error)
-            return Spread(np.minimum(a.low, b.low), np.minimum(a.high, b.high), error)
-        case _:
-            error = np.maximum(a.error, b.error)
-            error = np.where(b.low - b.error > a.high + a.error, b.error, error)
-            error = np.where(a.low - a.error > b.high + b.error, a.error, error)
-            return Spread(np.maximum(a.low, b.low), np.maximum(a.high, b.high), error)
+def _product(a: Spread, b: Spread) -> Spread:
+    ends = [x * y for x in (a.low, a.high) for y in (b.low, b.high)]
+    ends = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0 infinity
+    is_none = a.is_none | b.is_none
+    low, high = np.minimum.reduce(ends), np.maximum.reduce(ends)
+    exact = np.maximum(np.abs(b.low), np.abs(b.high))
+    error = times(a.size, b.error) + times(exact, a.error)
+    low = np.where(is_none, np.nan, low)
+    return Spread(low, np.where(is_none, np.nan, high), error)
 
 
-def _times(size: Array, error: Array) -> Array:
+def _smaller(a: Spread, b: Spread) -> Spread:
+    """Return the smaller of two; where it is sure which it is, the error is its own."""
+    error = np.maximum(a.error, b.error)
+    error = np.where(b.high + b.error < a.low - a.error, b.error, error)
+    error = np.where(a.high + a.error < b.low - b.error, a.error, error)
+    return Spread(np.minimum(a.low, b.low), np.minimum(a.high, b.high), error)
+
+
+def times(size: Array, error: Array) -> Array:
+    """Return an error that is magnified; none stays none."""
     return np.where(error == 0.0, 0.0, size * error)
 
 
@@ -285,7 +337,7 @@ def _quotient(a: Spread, b: Spread) -> Spread:
     low, high = np.minimum.reduce(ends), np.maximum.reduce(ends)
     least = np.maximum(b.low, -b.high)
     size = np.maximum(np.abs(low), np.abs(high))
-    error = (a.error + _times(size, b.error)) / (least - b.error)
+    error = (a.error + times(size, b.error)) / (least - b.error)
     is_open = least <= b.error
     sure = [(one.low == 0.0) & (one.high == 0.0) & (one.error == 0.0) for one in (a, b)]
     is_none = (sure[0] & sure[1]) | a.is_none
