@@ -25,6 +25,7 @@ from fuzzytree.semantics import (
     Step,
     Worst,
     evaluate_program,
+    needed_steps,
     worst_over,
 )
 
@@ -101,41 +102,32 @@ class FixedSteps(CSteps):
 
     def scales(self) -> Iterator[str]:
         """Yield of how many bits behind the point inputs and outputs are, in words."""
-        places = {s.name: p for p, s in enumerate(self.steps) if s.operation == "input"}
+        inputs, outputs = self._end_bits()
         for line, name in enumerate(self.program.inputs):
-            bits = self.bits[places[name]] if name in places else 0
-            yield f"x[{line}] is {name} times 2^{bits}, moved into its range"
-        for line, result in enumerate(self.program.results[:-1]):
-            bits = self.bits[result.step]
-            yield f"outputs[{line}] is {result.title} times 2^{bits}"
+            yield f"x[{line}] is {name} times 2^{inputs[line]}, moved into its range"
+        for line, bits in enumerate(outputs):
+            title = self.program.results[line].title
+            yield f"outputs[{line}] is {title} times 2^{bits}"
 
     def examples(self, rows: Sequence[Sequence[float]]) -> Iterator[SystemExample]:
         """Yield examples in whole numbers, as they stand in the file."""
-        places = {s.name: p for p, s in enumerate(self.steps) if s.operation == "input"}
+        scales, units = (2.0 ** np.array(bits) for bits in self._end_bits())
+        low, high = np.array(self.ranges).reshape(-1, 2).T
+        errors = (np.ceil(self.worst.errors[:-1] * units) + 1.0).tolist()
         for row in rows:
-            line: list[float] = []
-            for name, value, (low, high) in zip(
-                self.program.inputs, row, self.ranges, strict=True
-            ):
-                scale = 2.0 ** self.bits[places.get(name, 0)]
-                inside = min(max(value if math.isfinite(value) else low, low), high)
-                line.append(float(math.trunc(inside * scale)))
-            scales = [2.0 ** self.bits[places.get(n, 0)] for n in self.program.inputs]
-            values = dict(
-                zip(self.program.inputs, np.array(line) / scales, strict=True)
-            )
+            inside = np.clip(np.where(np.isfinite(row), row, low), low, high)
+            line = np.trunc(inside * scales) + 0.0  # sums have no -0
+            values = dict(zip(self.program.inputs, line / scales, strict=True))
             *outputs, status = evaluate_program(self.program, values).values
-            units = [2.0 ** self.bits[r.step] for r in self.program.results[:-1]]
-            numbers = tuple(
-                float(round(o * unit)) for o, unit in zip(outputs, units, strict=True)
-            )
-            errors = zip(self.worst.errors[:-1], units, strict=True)
-            yield (
-                line,
-                numbers,
-                [math.ceil(e * u) + 1.0 for e, u in errors],
-                int(status),
-            )
+            numbers = tuple((np.round(outputs * units) + 0.0).tolist())
+            yield line.tolist(), numbers, errors, int(status)
+
+    def _end_bits(self) -> tuple[list[int], list[int]]:
+        """Return the bits of inputs, 0 of those that are not used, and of outputs."""
+        steps = zip(self.program.steps, self.bits, strict=True)
+        used = {step.name: bits for step, bits in steps if step.operation == "input"}
+        inputs = [used.get(name, 0) for name in self.program.inputs]
+        return inputs, [self.bits[one.step] for one in self.program.results[:-1]]
 
     def value(self, place: int) -> str:
         """Return a step's result as an expression of its own bits."""
@@ -260,7 +252,7 @@ def _fitted(
     Raises:
         ValueError: As for `FixedSteps`.
     """
-    needed = _needed(program)
+    needed = needed_steps(program.steps, program.results)
     for place in needed:
         operation = program.steps[place].operation
         if operation not in _OPERATIONS | _TRUTHS:
@@ -280,14 +272,6 @@ def _fitted(
             return bits, worst
         worst = worst._replace(sizes=np.fmax(worst.sizes, before.sizes))
     raise ValueError("fixed point: errors grow beyond the numbers; take q31 or float32")
-
-
-def _needed(program: Program) -> list[int]:
-    needed = {result.step for result in program.results}
-    for place in range(len(program.steps) - 1, -1, -1):
-        if place in needed:
-            needed |= {*program.steps[place].arguments}
-    return sorted(needed)
 
 
 def _bits(

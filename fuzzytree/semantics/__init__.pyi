@@ -82,6 +82,7 @@ from .programs.steps import Program as Program
 from .programs.steps import Result as Result
 from .programs.steps import ResultKind as ResultKind
 from .programs.steps import Step as Step
+from .programs.steps import needed_steps as needed_steps
 from .programs.steps import result_of as result_of
 from .programs.system_program import from_system as from_system
 from .programs.tree_program import from_tree as from_tree

@@ -307,14 +307,8 @@ class Maker(Numbers[Place]):
         self, name: str, inputs: tuple[str, ...], results: tuple[Result, ...]
     ) -> Program:
         """Return the steps that some results need, in order, and nothing else."""
-        needed: set[int] = set()
-        todo = [result.step for result in results]
-        while todo:
-            place = todo.pop()
-            if place not in needed:
-                needed.add(place)
-                todo += self._steps[place].arguments
-        new = {old: place for place, old in enumerate(sorted(needed))}
+        needed = needed_steps(self._steps, results)
+        new = {old: place for place, old in enumerate(needed)}
         steps = tuple(_moved(self._steps[old], new) for old in new)
         moved = tuple(Result(one.kind, one.name, new[one.step]) for one in results)
         titles = [self._titles[old] for old in new]
@@ -344,6 +338,18 @@ class Maker(Numbers[Place]):
         if step.operation in _LEAVES or not self._topic:
             return step.name
         return f"{self._topic} {step.operation.replace('_', ' ')}"
+
+
+def needed_steps(steps: Sequence[Step], results: Iterable[Result]) -> list[int]:
+    """Return the places of the steps that some results need, in order."""
+    needed: set[int] = set()
+    todo = [result.step for result in results]
+    while todo:
+        place = todo.pop()
+        if place not in needed:
+            needed.add(place)
+            todo += steps[place].arguments
+    return sorted(needed)
 
 
 def _moved(step: Step, new: dict[int, int]) -> Step:
