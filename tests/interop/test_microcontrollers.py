@@ -358,7 +358,7 @@ def test_a_report_names_compilers_that_are_missing_and_other_formats(
 ) -> None:
     model, target = tmp_path / "fan.yaml", tmp_path / "fan.c"
     ft.save(fan(), model)
-    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.setenv("PATH", str(tmp_path))
     assert main(["export", str(model), "-o", str(target), "--report"]) == 0
     shown = capsys.readouterr().err
     assert "size     Cortex-M0: arm-none-eabi-gcc is not installed" in shown
