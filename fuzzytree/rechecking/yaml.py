@@ -1,4 +1,4 @@
-"""YAML, as far as fuzzytree writes it."""
+"""YAML without tags, anchors, tabs and what else no model needs."""
 
 from __future__ import annotations
 
@@ -13,12 +13,17 @@ from fuzzytree.rechecking.outcomes import CannotRunError
 MOST_BYTES = 64 * 2**20
 MOST_LEVELS = 32
 
-_KEY = re.compile(r"((?:0 )?[a-z][a-z ]*):(?: +|$)")
 _QUOTED = re.compile(r"'((?:[^']|'')*)'|\"((?:[^\"\\]|\\.)*)\"")
-_NAME = re.compile(rf"({_QUOTED.pattern}|[^ ,'\"\[\]{{}}][^,\[\]{{}}]*?):(?: +)")
+_KEY = re.compile(
+    rf"({_QUOTED.pattern}|(?!-[- ])[^ ,'\"\[\]{{}}?&*!|>%@`].*?) *:(?: +|$)"
+)
+_NAME = re.compile(
+    rf"({_QUOTED.pattern}(?= *:)|[^ ,'\"\[\]{{}}][^,\[\]{{}}]*?(?= *: )) *: *"
+)
 """A key in braces, which may be the name of a class."""
 _PART = re.compile(
-    rf"(?<![^ \[{{,])(?:{_QUOTED.pattern}|(?P<open>['\"]))|(?<![^ ])(?P<comment>#)|."
+    rf"(?:(?<![^ \[{{,])|(?<=[\"']:))(?:{_QUOTED.pattern}|(?P<open>['\"]))"
+    r"|(?<![^ ])(?P<comment>#)|."
 )
 _ESCAPE = re.compile(r"\\(x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|.)")
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "0": "\0", "\\": "\\", '"': '"', "/": "/"}
@@ -92,9 +97,14 @@ class _Reader:
         return line
 
     def document(self) -> Any:
+        for mark, place in (("%YAML 1.2", 0), ("---", 0), ("...", -1)):
+            if self.lines and self.lines[place].text == mark:
+                del self.lines[place]
         if not self.lines:
             raise CannotRunError(f"{self.name}: the file is empty")
         result = self._block(self.lines[0].indent, 1)
+        if not isinstance(result, dict | list):
+            self.fail(f"no key and no list: {self.lines[0].text[:40]!r}")
         if self.at < len(self.lines):
             self.number = self.lines[self.at].number
             self.fail(f"{self.lines[self.at].text[:40]!r} is not understood here")
@@ -108,7 +118,7 @@ class _Reader:
         return line
 
     def _block(self, indent: int, level: int) -> Any:
-        """Return the list or mapping whose lines begin at this indent."""
+        """Return the list, mapping or value whose lines begin at this indent."""
         line = self._next(indent)
         text = line.text if line else ""
         if level > MOST_LEVELS:
@@ -117,7 +127,7 @@ class _Reader:
             return self._list(indent, level)
         if _KEY.match(text):
             return self._mapping(indent, level)
-        self.fail(f"no key and no list: {text[:40]!r}")
+        return self._value(text, indent - 1)
 
     def _list(self, indent: int, level: int) -> Items:
         items = Items()
@@ -137,17 +147,18 @@ class _Reader:
     def _mapping(self, indent: int, level: int) -> dict[str, Any]:
         pairs: dict[str, Any] = {}
         while (line := self._next(indent)) and (key := _KEY.match(line.text)):
-            if key[1] in pairs:
-                self.fail(f"the key {key[1]!r} stands twice")
+            name = str(self._scalar(key[1]))
+            if name in pairs:
+                self.fail(f"the key {name!r} stands twice")
             if key.end() < len(line.text):
-                pairs[key[1]] = self._value(line.text[key.end() :], indent)
+                pairs[name] = self._value(line.text[key.end() :], indent)
                 continue
             self.at += 1
             below = self.lines[self.at] if self.at < len(self.lines) else line
             is_list = below.indent == indent and below.text.startswith("- ")
             if below.number == line.number or not (below.indent > indent or is_list):
-                self.fail(f"the key {key[1]!r} has no value")
-            pairs[key[1]] = self._block(below.indent, level + 1)
+                self.fail(f"the key {name!r} has no value")
+            pairs[name] = self._block(below.indent, level + 1)
         return pairs
 
     def _value(self, text: str, indent: int) -> Any:
@@ -165,16 +176,19 @@ class _Reader:
             starts.append((end + 1, line.number, line.indent + 1))
             end, depth = end + 1 + len(line.text), depth + _depth(line.text)
             self.at += 1
-        whole = " ".join(parts)
+        self.starts, whole = starts, " ".join(parts)
         if text[0] in "'\"" and len(starts) > 1:
             self.fail("a quoted text over several lines")
         if text[0] not in "[{":
             return self._scalar(whole)
-        self.starts = starts
         result, end = self._flow(whole, 0, 0)
         if end != len(whole):
             self.fail(f"more behind the bracket: {whole[end:]!r}")
         return result
+
+    def _line_at(self, at: int) -> int:
+        """Return which line of a value stands at a position of its text."""
+        return bisect_right(self.starts, at, key=itemgetter(0)) - 1
 
     def _flow(self, text: str, at: int, level: int) -> tuple[Any, int]:
         """Return a value in brackets, braces or quotes, or a word, and its end."""
@@ -182,6 +196,8 @@ class _Reader:
             self.fail(f"more than {MOST_LEVELS} levels")
         if text[at : at + 1] not in ("[", "{"):
             quoted = _QUOTED.match(text, at)
+            if quoted and self._line_at(at) != self._line_at(quoted.end() - 1):
+                self.fail("a quoted text over several lines")
             word = (
                 quoted[0]
                 if quoted
@@ -192,8 +208,7 @@ class _Reader:
         close, at = "]" if is_list else "}", _behind_blanks(text, at + 1)
         while text[at : at + 1] != close:
             if is_list:
-                line = bisect_right(self.starts, at, key=itemgetter(0)) - 1
-                start, number, column = self.starts[line]
+                start, number, column = self.starts[self._line_at(at)]
                 items.places.append((number, column + at - start))
                 item, at = self._flow(text, at, level + 1)
                 items.append(item)
@@ -219,7 +234,11 @@ class _Reader:
             return _INFINITE[text]
         if _ALIEN.fullmatch(text):
             self.fail(f"{text!r} has no place in a model")
-        if text[0] in "&*!|>@%`?,[]{}#" or text[:2] in ("- ", "--") or ": " in text:
+        if (
+            text[0] in "&*!|>@%`?,[]{}#"
+            or text[:2] in ("- ", "--")
+            or ": " in f"{text} "
+        ):
             self.fail(f"{text[:40]!r} is not read; quotes make it a text")
         if _INTEGER.fullmatch(text):
             return int(text)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import random
+import re
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml as pyyaml
 
 import fuzzytree as ft
 from fuzzytree.auditing.decide import states
@@ -222,3 +225,32 @@ def test_an_audit_of_a_file_in_flow_style_is_checked_again(tmp_path: Path) -> No
 def test_items_in_brackets_have_places() -> None:
     found = read_yaml(b"a: [x,\n  {b: [1]},\nz]\n", "x.yaml")
     assert found["a"].places == [(1, 5), (2, 3), (3, 1)]
+
+
+def test_every_way_to_write_a_model_that_users_have_is_read_alike() -> None:
+    system = random_system(3, formulas="none")
+    facts = json.loads(json.dumps(read_yaml(yaml.write(system).content, "x.yaml")))
+    block = pyyaml.safe_dump(facts, default_flow_style=False, sort_keys=False)
+    ways = [block, pyyaml.safe_dump(facts, default_flow_style=True, width=1000)]
+    ways += [json.dumps(facts), json.dumps(facts, indent=2)]
+    ways += [json.dumps(facts, separators=(",", ":"))]
+    ways += [f"%YAML 1.2\n--- # a model\n{block}...\n", block.replace(": ", " : ")]
+    ways += [re.sub(r"^name: ", "name:\n  ", block, flags=re.MULTILINE)]
+    for way in ways:
+        assert read_yaml(way.encode(), "x.yaml") == facts
+
+
+def test_a_key_on_its_line_is_any_name_of_a_class() -> None:
+    content = b"p:\n  'a: b': 0.5\n  hand-0 : 0.25\n  \"q, {\": 1\n  'True': 2\n"
+    facts = read_yaml(content, "x")
+    assert facts == {"p": {"a: b": 0.5, "hand-0": 0.25, "q, {": 1, "True": 2}}
+
+
+@pytest.mark.parametrize("text", ["a: ['b\n\n  c']", "a: 'b\n  c'", "a: [b:]"])
+def test_texts_whose_end_is_not_plain_are_refused(text: str) -> None:
+    with pytest.raises(CannotRunError):
+        read_yaml(text.encode(), "x.yaml")
+
+
+def test_a_comment_sign_in_quotes_behind_a_colon_is_text() -> None:
+    assert read_yaml(b'{"a":"b # c"}', "x.yaml") == {"a": "b # c"}
