@@ -8,6 +8,7 @@ import os
 import stat
 import warnings
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeVar, Unpack, cast, get_args
 
@@ -50,6 +51,7 @@ from fuzzytree.model import (
     Variable,
     Written,
     as_names,
+    fingerprint,
     kind_of,
     name_choice,
     printable,
@@ -905,9 +907,10 @@ def recheck(
     new: str | os.PathLike[str] | None = None,
     solver: str = "",
 ) -> Report:
-    """Check the JSON file of an audit against the YAML file of its model, on its own.
+    """Check the JSON file of an audit against the file of its model, on its own.
 
     With `new`, it is the JSON file of a comparison of `model` with this other model.
+    The re-checker reads YAML; any other file is checked as the YAML that is made of it.
     `solver` is the program that decides what is PROVED; the package z3 by default.
 
     The report's `wrong` lists what does not hold; `lines()` is what the command prints.
@@ -917,11 +920,27 @@ def recheck(
     """
     from fuzzytree.rechecking import CannotRunError, recheck_files
 
+    names = [os.fspath(path) for path in (audit, model, new) if path is not None]
     try:
-        paths = [audit, model] if new is None else [audit, model, new]
-        return recheck_files(*[os.fspath(one) for one in paths], solver=solver)
+        report = None if new else _recheck_conversion(names[0], names[1], solver)
+        return report or recheck_files(*names, solver=solver)
     except CannotRunError as error:
         raise ReadError(str(error)) from error
+
+
+def _recheck_conversion(audit: str, path: str, solver: str) -> Report | None:
+    """Check an audit against the YAML of a file that the re-checker does not read."""
+    from fuzzytree.rechecking import CannotRunError, read_json, read_yaml, recheck
+
+    source = read_bounded(path)
+    with suppress(CannotRunError):
+        if checking.format_of(path).name == "yaml" and read_yaml(source, path):
+            return None
+    content, model = read_bounded(audit), read(path).model
+    if read_json(content, audit).get("fingerprint") != fingerprint(model):
+        raise ReadError(f"{path}: not the audited model, or read by another --from")
+    made = find_format("yaml").write(model).content
+    return recheck(content, made, (audit, path), solver, source)
 
 
 def draw(tree: ModelSource, *, title: str | None = None) -> Picture:

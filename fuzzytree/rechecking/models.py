@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from pathlib import PurePath
 from typing import Any, NamedTuple
 
 from fuzzytree.rechecking.curves import (
@@ -122,11 +120,8 @@ class Model:
         except CannotRunError as error:
             if name.lower().endswith((".yaml", ".yml")):
                 raise
-            there = shlex.quote(str(PurePath(name).with_suffix(".yaml")))
-            raise CannotRunError(
-                f"{name}: only YAML is checked again; convert it, and audit and check "
-                f"{there}: fuzzytree convert {shlex.quote(name)} {there}"
-            ) from error
+            text = "only YAML is checked again; `fuzzytree convert` makes it"
+            raise CannotRunError(f"{name}: {text}") from error
         kind = top.get("kind") if isinstance(top, dict) else None
         if str(kind) not in LAYOUTS:
             text = f"rule bases, trees and systems are checked, not {kind!r:.60}"

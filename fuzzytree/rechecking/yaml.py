@@ -22,9 +22,9 @@ _NAME = re.compile(
 )
 """A key in braces, which may be the name of a class."""
 _PART = re.compile(
-    rf"(?:(?<![^ \[{{,])|(?<=[\"']:))(?:{_QUOTED.pattern}|(?P<open>['\"]))"
-    r"|(?<![^ ])(?P<comment>#)|."
+    rf"(?<![^ \[{{,])(?:{_QUOTED.pattern}|(?P<open>['\"]))|(?<![^ ])(?P<comment>#)|."
 )
+_SIGNS = "&*!|>@%`?,[]{}#"
 _ESCAPE = re.compile(r"\\(x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|.)")
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "0": "\0", "\\": "\\", '"': '"', "/": "/"}
 _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")
@@ -198,11 +198,8 @@ class _Reader:
             quoted = _QUOTED.match(text, at)
             if quoted and self._line_at(at) != self._line_at(quoted.end() - 1):
                 self.fail("a quoted text over several lines")
-            word = (
-                quoted[0]
-                if quoted
-                else re.split(r"[,\]}\[{]", text[at:], maxsplit=1)[0]
-            )
+            plain = re.split(r"[,\]}\[{]", text[at:], maxsplit=1)
+            word = quoted[0] if quoted else plain[0]
             return self._scalar(word.rstrip(" ")), at + len(word)
         is_list, pairs, items = text[at] == "[", dict[str, Any](), Items()
         close, at = "]" if is_list else "}", _behind_blanks(text, at + 1)
@@ -234,11 +231,7 @@ class _Reader:
             return _INFINITE[text]
         if _ALIEN.fullmatch(text):
             self.fail(f"{text!r} has no place in a model")
-        if (
-            text[0] in "&*!|>@%`?,[]{}#"
-            or text[:2] in ("- ", "--")
-            or ": " in f"{text} "
-        ):
+        if text[0] in _SIGNS or text[:2] in ("- ", "--") or ": " in f"{text} ":
             self.fail(f"{text[:40]!r} is not read; quotes make it a text")
         if _INTEGER.fullmatch(text):
             return int(text)

@@ -102,11 +102,6 @@ REASONS: tuple[tuple[str, str], ...] = (
         "centroid or an average; the sentence names what is in the way",
     ),
     (
-        "only YAML is checked again",
-        "the re-checker shares no code with the readers; its sentence gives the "
-        "command that writes the YAML",
-    ),
-    (
         "the dialect [a-z]+ has no .* (there|alike)|[a-z]+ has no such conclusion",
         "this dialect has no words for it; the sentence names one that has",
     ),
