@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from typing import Any
 
@@ -34,7 +35,7 @@ from fuzzytree.auditing.decide.rules import Literal
 Sides = dict[str, tuple[Fraction, Fraction]]
 """A box: the ends of some axes."""
 
-_HALVINGS = 10
+_HALVINGS, _LOOKS = 10, 8
 _HALF = Fraction(1, 2)
 
 
@@ -304,14 +305,10 @@ def least_cover(claims: Claims, budget: Budget) -> tuple[Fraction, Fraction]:
     """Return bounds of the least strength that the strongest rule has anywhere."""
     base = claims.base
     every = tuple(range(base.count))
-    drawn = base.sample_strengths.max(axis=0).min(initial=1.0) if base.count else 0.0
     ends: Sequence[Fraction] = ()
     if base.is_lattice and base.is_exact and not base.is_coupled:
-        try:
+        with suppress(TooManyError, OutOfStepsError):
             ends = LevelView(base, every, budget).levels
-        except (TooManyError, OutOfStepsError):
-            ends = ()
-
     if ends:
         marks = [*itertools.pairwise(ends)]
         first, last = 0, len(marks) - 1
@@ -331,7 +328,11 @@ def least_cover(claims: Claims, budget: Budget) -> tuple[Fraction, Fraction]:
             ):
                 return marks[-1][1], marks[-1][1]
             return marks[first][0], marks[first][0]
-    low, high = ZERO, min(Fraction(drawn + 1e-9), ONE)
+    low, high = ZERO, ONE
+    drawn = base.sample_strengths.max(axis=0, initial=0.0)  # of lines below the curves
+    for number in drawn.argsort(kind="stable")[:_LOOKS].tolist():
+        if base.contains(point := base.sample(number)):
+            high = min(high, max(base.strengths(point)[1], default=ZERO))
     for _ in range(_HALVINGS):
         level = (low + high) / 2
         answer = claims.below(level, budget)

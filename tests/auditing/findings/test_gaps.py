@@ -5,11 +5,26 @@ from __future__ import annotations
 import numpy as np
 from msgspec.structs import replace
 
+import fuzzytree as ft
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings.deciding import cover_answers as answers
-from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    AuditSelection,
+    AuditSettings,
+)
 from fuzzytree.auditing.findings.subject import AuditRows, subject_of, view
+from fuzzytree.model import (
+    Bell,
+    Conclusion,
+    Defuzzifier,
+    FuzzySystem,
+    RuleBlock,
+    Singleton,
+    SystemOutput,
+    SystemRule,
+)
 from fuzzytree.model.rulebase import (
     Points,
     Proposition,
@@ -91,3 +106,17 @@ def test_cover_by_rules_that_are_not_all_there_is_declined() -> None:
     (only,) = _asked(0.0, 2.5, is_whole=False)
     assert isinstance(only.state, Declined)
     assert not only.is_finding
+
+
+def test_the_least_strength_of_curves_is_that_of_the_curves() -> None:
+    terms = (Term("high", Bell(8.0, 2.0, 3.0)),)
+    how = Defuzzifier("weighted average")
+    output = SystemOutput("z", (Term("n", Singleton(1.0)),), 0.0, 2.0, how)
+    rule = SystemRule(Proposition("b", ("high",)), (Conclusion("z", "n"),))
+    inputs = (Variable("b", terms, low=0.0, high=10.0),)
+    system = FuzzySystem("f", inputs, (output,), (RuleBlock((rule,)),))
+    result = ft.audit(system, selection=AuditSelection(select=["FT301"]))
+    (weak,) = [answer for answer in result.answers if answer.message == "FT301.weak"]
+    low, high = (measure.value for measure in weak.measures)
+    assert low <= 1 / 4097 <= high  # the bell at 0, farthest from its center
+    assert high - low < 1e-5
