@@ -15,8 +15,7 @@ class RecheckOptions:
     model: ModelPath = model_argument()
     new: str | None = argument("[NEW]", required=False)
     solver: str | None = option(
-        "--solver PROGRAM",
-        "Solver that reads SMT-LIB 2 from standard input; the package z3 by default.",
+        "--solver PROGRAM", "Solver of SMT-LIB 2 on stdin; the package z3 by default."
     )
 
 
