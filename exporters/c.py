@@ -37,22 +37,28 @@ from fuzzytree.exporters.c_text import (
 )
 from fuzzytree.exporters.program_text import check_rated, source_of, title_of
 from fuzzytree.model import (
+    Band,
     Document,
     Format,
     FuzzySystem,
     FuzzyTree,
+    Loss,
     Model,
+    Points,
     RuleBase,
     SystemOutput,
+    Term,
     Variable,
     Written,
     fingerprint,
     narrowing_refusal,
     outline,
+    refusal,
     sentence,
     stand_ins,
 )
 from fuzzytree.numerics import losses
+from fuzzytree.semantics import pointed, shape_of
 
 _NUMBERS = {"float64": DOUBLE, "float32": SINGLE, "q15": Q15, "q31": Q31}
 
@@ -103,6 +109,7 @@ def write_c(
     activations: bool = False,
     probabilities: bool = False,
     tables: bool = False,
+    tolerance: float | None = None,
     selftest: bool = True,
 ) -> Written:
     """Return a model as the text of a C file, in ASCII.
@@ -124,6 +131,8 @@ def write_c(
         tables: Of a fuzzy system: whether curves of outputs are tables of all samples,
             which is some three times as quick, and larger; else they are where that
             is smaller.
+        tolerance: Of fixed point: the largest error of a degree where points stand for
+            a curve of an input; such curves are refused unless given.
         selftest: Whether the file also holds a program that tests it, which is what
             takes most of the time to write.
 
@@ -143,13 +152,24 @@ def write_c(
     if probabilities:
         check_rated(model, "c")
     prefix = beginning(model.name, name)
+    if tolerance is not None and dtype not in ("q15", "q31"):
+        raise ValueError("a tolerance is that of fixed point: dtype=q15 or q31")
     if isinstance(model, FuzzySystem):
+        lost: tuple[Loss, ...] = ()
+        if tolerance is not None:
+            model, lost = pointed(model, tolerance, keeps=_has_lines)
+        if lost and not allow_loss:
+            raise refusal(model.name, f"c {dtype}", lost)
         file = system_file(
-            model, _NUMBERS[dtype], activations=activations, tables=tables
+            model,
+            _NUMBERS[dtype],
+            activations=activations,
+            tables=tables,
+            curves={loss.where: loss.bound or 0.0 for loss in lost},
         )
         body = "".join(file.text(selftest=selftest))
         text = "".join(_heading(model, source)) + fill(body, prefix)
-        return Written(text.encode("ascii"), remarks=tuple(file.remarks()))
+        return Written(text.encode("ascii"), lost, tuple(file.remarks()))
     if activations:
         raise ValueError("activations are those of fuzzy systems")
     if tables:
@@ -177,6 +197,12 @@ def beginning(own: str, name: str | None) -> str:
             f"the name {name!r} cannot begin the names of C; {prefix!r} can"
         )
     return prefix
+
+
+def _has_lines(variable: Variable | SystemOutput, term: Term) -> bool:
+    """Return whether whole numbers have a term's degrees: of lines, or in a table."""
+    is_straight = isinstance(shape_of(term.function), Points | Band)
+    return isinstance(variable, SystemOutput) or is_straight
 
 
 class CFile(CModel):

@@ -8,7 +8,7 @@ ends. Products, quotients and sums are computed in twice as many bits.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -19,6 +19,7 @@ from fuzzytree.exporters.c_text import CNumbers
 from fuzzytree.exporters.program_text import SystemExample
 from fuzzytree.model import FloatArray
 from fuzzytree.semantics import (
+    ARRAYS,
     OVER_SAMPLES,
     Program,
     Rounding,
@@ -26,6 +27,7 @@ from fuzzytree.semantics import (
     Worst,
     evaluate_program,
     needed_steps,
+    still_results,
     worst_over,
 )
 
@@ -34,6 +36,13 @@ _OPERATIONS = frozenset(
     ("constant", "input", "index", "add", "subtract", "multiply", "divide", "minimum")
 ) | {"maximum", "negate", "absolute", "where", "total", "less", "at_most", "equal"}
 _TRUTHS = frozenset(("and", "or", "not", "less", "at_most", "equal"))
+_LOOKED_UP = frozenset(("below", "pick"))
+_FOLDED = frozenset(("add", "subtract", "multiply", "minimum", "maximum", "negate"))
+_EDGES: Mapping[str, tuple[Callable[[float], int], Callable[[float], int]]] = {
+    "less": (math.floor, math.ceil),
+    "at_most": (math.ceil, math.floor),
+    "equal": (round, round),
+}  # how a constant is rounded that stands first, or second
 _TRIES = 8
 
 
@@ -71,11 +80,12 @@ class FixedSteps(CSteps):
         program: The program.
         ranges: Of each input.
         numbers: The type of all numbers.
+        curves: How far steps are from the curves that they stand for, by their titles.
         tables: Whether all samples that no input enters are tables.
 
     Attributes:
         bits: Behind the point, of each step.
-        worst: The worst errors of its results.
+        worst: The worst errors of its results, those of curves included.
 
     Raises:
         ValueError: If a step has no range or bound, or is none of whole numbers.
@@ -86,12 +96,20 @@ class FixedSteps(CSteps):
         program: Program,
         ranges: Sequence[tuple[float, float]],
         numbers: FixedNumbers,
+        curves: Mapping[str, float],
         *,
         tables: bool = False,
     ) -> None:
-        program = _decided(program, ranges)
+        program, new = _decided(program, ranges)
+        off = {
+            new[place]: curves[title]
+            for place, title in enumerate(program.titles)
+            if title in curves
+        }
+        program = _in_tables(program)
         self.fixed, self.ranges = numbers, ranges
-        self.bits, self.worst = _fitted(program, ranges, numbers)
+        self.bits, self.whole_worst = _fitted(program, ranges, numbers)
+        self.worst = worst_over(program, ranges, _rounding(program, self.bits, off))
         for result, share in zip(program.results, self.worst.shares, strict=True):
             if share > 0.0:
                 raise ValueError(
@@ -113,7 +131,7 @@ class FixedSteps(CSteps):
         """Yield examples in whole numbers, as they stand in the file."""
         scales, units = (2.0 ** np.array(bits) for bits in self._end_bits())
         low, high = np.array(self.ranges).reshape(-1, 2).T
-        errors = (np.ceil(self.worst.errors[:-1] * units) + 1.0).tolist()
+        errors = (np.ceil(self.whole_worst.errors[:-1] * units) + 1.0).tolist()
         for row in rows:
             inside = np.clip(np.where(np.isfinite(row), row, low), low, high)
             line = np.trunc(inside * scales) + 0.0  # sums have no -0
@@ -158,10 +176,10 @@ class FixedSteps(CSteps):
             return _shifted("i", bits)
         if step.operation in ("and", "or", "not"):
             return super().expression(step)
-        if step.operation in ("less", "at_most", "equal"):
-            finest = max(self.bits[one] for one in step.arguments)
-            a, b = (self._at(one, finest) for one in step.arguments)
-            return f"{a} {self.signs[step.operation]} {b}"
+        if step.table:
+            return self._looked_up(step, bits)
+        if step.operation in _EDGES:
+            return self._comparison(step)
         if step.operation in ("multiply", "divide"):
             a, b = (self.value(one) for one in step.arguments)
             first, second = (self.bits[one] for one in step.arguments)
@@ -182,6 +200,37 @@ class FixedSteps(CSteps):
                 return f"{numbers[0]} {sign} {numbers[1]} ? {numbers[0]} : {numbers[1]}"
             case _:
                 return f"{numbers[0]} {_SHIFTED[step.operation]} {numbers[1]}"
+
+    def _comparison(self, step: Step) -> str:
+        """Compare; constants are rounded so that every whole number compares alike."""
+        numbers = [self.still[place] for place in step.arguments]
+        pairs = zip(step.arguments, numbers, strict=True)
+        finest = max(self.bits[place] for place, n in pairs if not isinstance(n, float))
+        texts: list[str] = []
+        ways = zip(step.arguments, numbers, _EDGES[step.operation], strict=True)
+        for place, number, way in ways:
+            if not isinstance(number, float):
+                texts.append(self._at(place, finest))
+                continue
+            end = 2.0**self.fixed.bits
+            exact = min(max(number * 2.0**finest, -end), end)
+            if math.isnan(number) or (step.operation == "equal" and exact % 1.0):
+                return "0"
+            texts.append(f"({way(exact)})")
+        return f"{texts[0]} {self.signs[step.operation]} {texts[1]}"
+
+    def _looked_up(self, step: Step, bits: int) -> str:
+        """Return a place among whole numbers, or the whole number at a place."""
+        (place,) = step.arguments
+        self.needs.add(step.operation)
+        scale, operand = 2.0**bits, self._at(place, 0)
+        if step.operation == "below":  # a whole number is above t if above its floor
+            scale, operand = 2.0 ** self.bits[place], self.value(place)
+        way = np.floor if step.operation == "below" else np.round
+        largest = 2.0**self.fixed.bits - 1.0
+        whole = np.clip(way(np.array(step.table) * scale), -largest, largest)
+        table = self.table(tuple(whole.tolist()))
+        return f"name_{step.operation}({table}, {len(whole)}u, {operand})"
 
     def _at(self, place: int, bits: int) -> str:
         if isinstance(self.still[place], float):
@@ -227,9 +276,15 @@ def _shifted(text: str, bits: int) -> str:
     return f"((name_wide)({text}) * ((name_wide)1 << {bits}))"
 
 
-def _decided(program: Program, ranges: Sequence[tuple[float, float]]) -> Program:
-    """Return a program without choices that are the same for all inputs in ranges."""
-    sizes = worst_over(program, ranges, lambda _, __: np.zeros(1)).sizes
+def _decided(
+    program: Program, ranges: Sequence[tuple[float, float]]
+) -> tuple[Program, list[int]]:
+    """Return a program without choices that are the same for all inputs in ranges.
+
+    And of each step before, which one has its result now.
+    """
+    exact: Rounding = lambda _, __: np.zeros(1)  # noqa: E731
+    sizes = worst_over(program, ranges, exact).sizes
     new: list[int] = []
     steps: list[Step] = []
     for place, step in enumerate(program.steps):
@@ -241,7 +296,54 @@ def _decided(program: Program, ranges: Sequence[tuple[float, float]]) -> Program
             chosen = end if steps[end].samples == step.samples else place
         new.append(chosen)
     results = tuple(replace(one, step=new[one.step]) for one in program.results)
-    return replace(program, steps=tuple(steps), results=results)
+    return replace(program, steps=tuple(steps), results=results), new
+
+
+def _in_tables(program: Program) -> Program:
+    """Return a program that looks up what can be computed beforehand.
+
+    That is what no input enters, samples if whole numbers cannot compute them, and
+    operations on numbers that are looked up at one place. A quotient by such numbers
+    is a product with their reciprocals: exact numbers stay the same.
+    """
+    steps, still = [*program.steps], still_results(program)
+    divisors = {step.arguments[1] for step in steps if step.operation == "divide"}
+    for step in steps:
+        count = 1 if step.operation == "divide" else len(step.arguments)
+        divisors.difference_update(step.arguments[:count])
+    divisors.difference_update(result.step for result in program.results)
+    foreign, turned = set[int](), set[int]()
+    for place, step in enumerate(steps):
+        table, values = _combined(steps, step), still[place]
+        if foreign & {*step.arguments} or step.operation not in _OPERATIONS | _TRUTHS:
+            foreign.add(place)
+            if isinstance(values, list) and step.kind == "number":
+                sizes = [(one.operation, one.samples) for one in steps]
+                table = sizes.index(("index", step.samples)), np.array(values)
+        if isinstance(values, float):
+            steps[place] = Step("constant", number=values)
+        elif step.operation == "divide" and step.arguments[1] in turned:
+            steps[place] = replace(step, operation="multiply")
+        elif table is not None and np.isfinite(table[1]).all():
+            numbers = table[1]
+            if place in divisors and numbers.all():
+                turned.add(place)
+                numbers = 1.0 / numbers
+            row = tuple(map(float, numbers))
+            steps[place] = Step("pick", (table[0],), table=row, samples=step.samples)
+    return replace(program, steps=tuple(steps))
+
+
+def _combined(steps: Sequence[Step], step: Step) -> tuple[int, FloatArray] | None:
+    """Return what an operation makes of numbers that stand at one place of tables."""
+    operands = [steps[place] for place in step.arguments]
+    places = {one.arguments[0] for one in operands if one.operation == "pick"}
+    is_looked_up = all(one.operation in ("pick", "constant") for one in operands)
+    if len(places) != 1 or not is_looked_up or step.operation not in _FOLDED:
+        return None
+    tables = [np.array(one.table or [one.number]) for one in operands]
+    with np.errstate(all="ignore"):
+        return places.pop(), np.asarray(ARRAYS[step.operation](*tables))
 
 
 def _fitted(
@@ -255,9 +357,9 @@ def _fitted(
     needed = needed_steps(program.steps, program.results)
     for place in needed:
         operation = program.steps[place].operation
-        if operation not in _OPERATIONS | _TRUTHS:
+        if operation not in _OPERATIONS | _TRUTHS | _LOOKED_UP:
             is_end = operation in OVER_SAMPLES or operation == "running"
-            hint = "take the centroid" if is_end else "approximate curves by points"
+            hint = "take the centroid" if is_end else "pass a tolerance, such as 1e-3"
             raise ValueError(
                 f"fixed point has no {operation.replace('_', ' ')}, which "
                 f"{program.titles[place]!r} needs; {hint}"
@@ -266,12 +368,15 @@ def _fitted(
     worst = worst_over(program, ranges, exact)
     for _ in range(_TRIES):
         bits = _bits(program, worst.sizes, numbers, needed)
-        before, worst = worst, worst_over(program, ranges, _rounding(program, bits))
+        before, worst = worst, worst_over(program, ranges, _rounding(program, bits, {}))
         sizes = np.array([worst.sizes[p] * 2.0 ** bits[p] for p in needed])
-        if (sizes < 2.0**numbers.bits).all():
+        if not (sizes >= 2.0**numbers.bits).any():  # of truths they may be none
             return bits, worst
         worst = worst._replace(sizes=np.fmax(worst.sizes, before.sizes))
-    raise ValueError("fixed point: errors grow beyond the numbers; take q31 or float32")
+    raise ValueError(
+        f"fixed point: errors grow beyond numbers of {numbers.bits + 1} bits; "
+        f"take {'q31 or ' * (numbers is Q15)}float32"
+    )
 
 
 def _bits(
@@ -280,7 +385,7 @@ def _bits(
     bits = [0] * len(program.steps)
     for place in needed:
         step, size = program.steps[place], float(sizes[place])
-        if step.kind == "truth":
+        if step.kind == "truth" or step.operation == "below":
             continue
         if not math.isfinite(size):
             raise ValueError(
@@ -294,14 +399,27 @@ def _bits(
     return bits
 
 
-def _rounding(program: Program, bits: Sequence[int]) -> Rounding:
+def _rounding(
+    program: Program, bits: Sequence[int], off: Mapping[int, float]
+) -> Rounding:
+    """Return by how much steps are rounded, and are off what they stand for."""
+    factors = {result.step for result in program.results}
+    for step in program.steps:
+        if step.operation in ("multiply", "divide"):
+            factors.update(step.arguments)
+
     def rounding(place: int, size: FloatArray) -> FloatArray:
         step, unit = program.steps[place], 2.0 ** -bits[place]
-        slack: FloatArray = 2.0**-48 * size
+        slack: FloatArray = 2.0**-48 * size + off.get(place, 0.0)
+        if step.operation == "constant" and place not in factors:
+            return np.zeros(1)  # what takes it rounds it
         if step.operation in ("index", "constant"):
             return np.abs(size - np.round(size / unit) * unit)
         if step.operation in ("multiply", "divide"):
             return unit + slack
+        if step.table:
+            table = np.array(step.table) * (step.operation == "pick")
+            return np.array([np.abs(table - np.round(table / unit) * unit).max()])
         lost = 0
         for one in step.arguments:
             number = program.steps[one].number / unit

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -253,9 +253,17 @@ class SystemFile(NamedTuple):
 
 
 def system_file(
-    system: FuzzySystem, numbers: CNumbers, *, activations: bool, tables: bool
+    system: FuzzySystem,
+    numbers: CNumbers,
+    *,
+    activations: bool,
+    tables: bool,
+    curves: Mapping[str, float],
 ) -> SystemFile:
     """Return the file of a system in numbers of a type.
+
+    `curves` says how far points are from the curves for which they stand, by the titles
+    of terms as losses have them.
 
     Raises:
         ValueError: If a number of the system is beyond the type.
@@ -283,7 +291,13 @@ def system_file(
                 one.name for one in system.variables if None in (one.low, one.high)
             ]
             raise ValueError(f"fixed point needs the range of {names[0]!r}; add it")
-        fixed = FixedSteps(program, ranges, numbers, tables=tables)
+        off = {
+            f"{variable.name} is {term.name}": curves[where]
+            for variable in system.variables
+            for term in variable.terms
+            if (where := f"term {term.name!r} of {variable.name!r}") in curves
+        }
+        fixed = FixedSteps(program, ranges, numbers, off, tables=tables)
         return SystemFile(system, fixed.program, fixed, numbers, fixed.worst)
     if numbers is not DOUBLE and has_ranges:
         worst = worst_over(program, ranges, float32_rounding(program))

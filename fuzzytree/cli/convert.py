@@ -55,9 +55,6 @@ class ConvertOptions(WritingOptions):
     dialect: str | None = option(
         "--dialect NAME", "Dialect of OUT; that of IN where both have one format."
     )
-    tolerance: str | None = option(
-        "--tolerance NUMBER", "Largest error of a degree where a curve becomes points."
-    )
     settings: Sequence[str] = several(
         "--set NAME=VALUE",
         "Option of the writer (repeat); `fuzzytree formats --format NAME` lists them.",

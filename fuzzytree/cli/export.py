@@ -12,12 +12,12 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
-from fuzzytree.cli.convert import carry, read_source
+from fuzzytree.cli.convert import carry, option_values, read_source
 from fuzzytree.cli.representation import (
     WritingOptions,
     wanted_format,
 )
-from fuzzytree.model import ModelPath
+from fuzzytree.model import ModelPath, Option
 
 
 class ExportOptions(WritingOptions):
@@ -29,8 +29,8 @@ class ExportOptions(WritingOptions):
     )
     dtype: str | None = option(
         "--dtype",
-        "onnx: number type of the degrees.",
-        choices=["float64", "mixed", "float32"],
+        "Number type: of the degrees in onnx, of all numbers in c.",
+        choices=["float64", "mixed", "float32", "q15", "q31"],
     )
     opset: int | None = option(
         "--opset", "onnx: version of the operators, 12 to 26.", type=int
@@ -80,10 +80,13 @@ def command(options: ExportOptions) -> int:
         "readable": options.readable or None,
         "plain": options.plain or None,
     }
-    values = {name: value for name, value in given.items() if value is not None}
+    values: dict[str, Option] = {
+        name: value for name, value in given.items() if value is not None
+    }
     form = wanted_format(options.output, options.to)
     with wrong_options():
         check_names(form, values)
+        values |= option_values(form, [("tolerance", options.tolerance)])
     if options.report and (form.name != "c" or options.output == "-"):
         raise click.UsageError(
             "--report is about a file of C; write one with -o FILE.c"

@@ -39,6 +39,9 @@ class WritingOptions(RepresentationOptions):
     to: str | None = option(
         "--to FORMAT", "Format of the file; from its suffix by default."
     )
+    tolerance: str | None = option(
+        "--tolerance NUMBER", "Largest error of a degree where a curve becomes points."
+    )
     allow_loss: bool = flag(
         "--allow-loss", "Write the file although the format loses information."
     )

@@ -286,9 +286,7 @@ def combined(step: Step, operands: Sequence[Spread]) -> Spread:
             gap = np.where(error == 0.0, 0.0, (over - under) * 1.0)
             return Spread(least * 1.0, most * 1.0, gap)
         case "pick":
-            first, last = np.full(low.shape, min(step.table)), max(step.table)
-            gap = np.where(error == 0.0, 0.0, last - first)
-            return Spread(first, np.full(low.shape, last), gap)
+            return _picked(np.array(step.table), a)
         case "total":
             return Spread(low.sum(axis=0), high.sum(axis=0), error.sum(axis=0))
         case "running":
@@ -305,6 +303,20 @@ def combined(step: Step, operands: Sequence[Spread]) -> Spread:
         case _:
             nothing = np.full(np.broadcast_shapes(low.shape, error.shape), np.inf)
             return Spread(-nothing, nothing, nothing)
+
+
+def _picked(table: Array, place: Spread) -> Spread:
+    """Return what numbers of a table can be, between places or, beyond it, anywhere."""
+    first, last = place.low - place.error, place.high + place.error
+    is_inside = (first >= 0.0) & (last <= len(table) - 1.0)
+    ends = np.where(is_inside, first, 0), np.where(is_inside, last, len(table) - 1) + 1
+    parts = np.stack(ends, axis=-1).astype(np.intp).ravel()
+    longer = np.append(table, table[-1])  # a part ends within it
+    low, high = (
+        way.reduceat(longer, parts)[::2].reshape(first.shape)
+        for way in (np.minimum, np.maximum)
+    )
+    return Spread(low, high, np.where(place.error == 0.0, 0.0, high - low))
 
 
 def _product(a: Spread, b: Spread) -> Spread:
@@ -436,16 +448,20 @@ class Worst(NamedTuple):
 
 
 _BOXES, _NUMBERS = 1 << 14, 1 << 22
+_MOST_NUMBERS = 1 << 25  # of all boxes
 
 
 def worst_over(
-    program: Program, ranges: Sequence[tuple[float, float]], rounding: Rounding
+    program: Program,
+    ranges: Sequence[tuple[float, float]],
+    rounding: Rounding,
 ) -> Worst:
     """Return the worst of a program over all inputs in ranges.
 
     They are parted into boxes, the same number of parts for each input.
     """
-    low, high = _boxes(ranges)
+    most = min(_BOXES, _MOST_NUMBERS // max(program.size, 1))
+    low, high = _boxes(ranges, most)
     some = max(_NUMBERS // max(program.size, 1), 1)
     errors: list[Array] = []
     sizes = np.zeros((-(-low.shape[1] // some), len(program.steps)))
@@ -476,11 +492,11 @@ def _size(step: Step, spread: Spread) -> float:
     return float(is_true) if is_sure else math.nan
 
 
-def _boxes(ranges: Sequence[tuple[float, float]]) -> tuple[Array, Array]:
+def _boxes(ranges: Sequence[tuple[float, float]], most: int) -> tuple[Array, Array]:
     """Return the ends of boxes that fill ranges, of shape (inputs, boxes)."""
     if not ranges:
         return np.empty((0, 1)), np.empty((0, 1))
-    count = max(int(_BOXES ** (1 / len(ranges)) + 1e-9), 1)
+    count = max(int(most ** (1 / len(ranges)) + 1e-9), 1)
     grids = [np.linspace(*one, count + 1) for one in ranges]
     low = np.meshgrid(*(grid[:-1] for grid in grids), indexing="ij")
     high = np.meshgrid(*(grid[1:] for grid in grids), indexing="ij")
