@@ -61,7 +61,7 @@ def term_text(
     return None if shape is None else " ".join([shape[0], *map(number, shape[1])])
 
 
-_OPERATORS = frozenset({"+", "-", "*", "/", "^"})
+_OPERATORS = {**{sign: sign for sign in "+-*/^"}, "fmod": "%"}
 _FUNCTIONS = {
     **{name: name.upper() for name in ("exp", "sin", "cos", "tan", "abs")},
     "log": "LN",
@@ -82,7 +82,7 @@ def _formula_text(expression: Expression, names: Names) -> str | None:
             if len(inner) < len(given):
                 return None
             if function in _OPERATORS:
-                return f"({f' {function} '.join(inner)})"
+                return f"({f' {_OPERATORS[function]} '.join(inner)})"
             word = _FUNCTIONS.get(function)
             return None if word is None else f"{word}({inner[0]})"
         case _:

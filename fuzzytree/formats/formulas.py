@@ -43,6 +43,18 @@ _BINARY: Mapping[str, tuple[int, int]] = {
 }
 """How closely an operator binds what is to its left and what is to its right."""
 
+
+class Operators(msgspec.Struct, frozen=True):
+    """How closely each operator binds, and which function `%` stands for."""
+
+    binary: Mapping[str, tuple[int, int]]
+    remainder: str = "%"
+
+
+FUZZYLITE: Final = Operators(_BINARY)
+JFUZZYLOGIC: Final = Operators({**_BINARY, "^": (9, 10), "%": (9, 10)}, "fmod")
+"""`^` and `%` bind alike, from the left, and a sign belongs to its number."""
+
 _SIGN, _CLOSEST = 10, 13
 _NEGATE, _NOT = "negate", "not"
 _PREFIX: Mapping[str, tuple[str, int]] = {
@@ -97,6 +109,7 @@ class _Text(msgspec.Struct, frozen=True):
 
     tokens: tuple[_Token, ...]
     names: Collection[str] | None
+    operators: Operators
 
 
 class _Grown(msgspec.Struct, frozen=True):
@@ -111,12 +124,18 @@ class _Grown(msgspec.Struct, frozen=True):
     is_literal: bool = False
 
 
-def parse(text: str, names: Collection[str] | None = None) -> Expression:
+def parse(
+    text: str,
+    names: Collection[str] | None = None,
+    *,
+    operators: Operators = FUZZYLITE,
+) -> Expression:
     """Return the expression of a formula.
 
     Args:
         text: The formula.
         names: The variables that it may use beside `x`; None allows any.
+        operators: What its operators mean.
 
     Raises:
         FormulaError: If it is none, is too long, or is nested too deeply.
@@ -131,7 +150,7 @@ def parse(text: str, names: Collection[str] | None = None) -> Expression:
         )
         raise FormulaError(1, sentence)
     tokens = (*_tokens(text), _Token("end", "", len(text) + 1))
-    grown = _part(_Text(tokens, names), 0, 0, 1)
+    grown = _part(_Text(tokens, names, operators), 0, 0, 1)
     behind = tokens[grown.end]
     if behind.kind != "end":
         raise _unexpected(behind, "an operator or the end")
@@ -166,11 +185,12 @@ def _part(text: _Text, place: int, closeness: int, level: int) -> _Grown:
     while True:
         token = text.tokens[left.end]
         word = "^" if token.text == "**" else token.text
-        binds = None if token.kind == "quoted" else _BINARY.get(word)
+        binds = None if token.kind == "quoted" else text.operators.binary.get(word)
         if binds is None or binds[0] < closeness:
             return left
         right = _part(text, left.end + 1, binds[1], level + 1)
-        left = _joined(token, word, (left, right), right.end)
+        function = text.operators.remainder if word == "%" else word
+        left = _joined(token, function, (left, right), right.end)
 
 
 def _operand(text: _Text, place: int, level: int) -> _Grown:

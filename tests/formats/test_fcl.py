@@ -522,6 +522,58 @@ def test_functions_of_jfuzzylogic_are_written_in_capitals_and_log_is_to_ten() ->
     )
 
 
+@pytest.mark.parametrize(
+    ("formula", "at_minus_7"),
+    [
+        ("2 ^ 3 ^ 2", 64.0),  # from the left
+        ("-2 ^ 2", 4.0),  # the sign belongs to the number
+        ("10 * 7 % 4", 30.0),  # % binds more closely than *
+        ("2 ^ 3 % 5", 3.0),
+        ("dirt % 4", -3.0),  # the sign of the first, as in Java
+    ],
+)
+def test_a_function_binds_its_operators_as_jfuzzylogic_does(
+    formula: str, at_minus_7: float
+) -> None:
+    text = STANDARD.replace("TERM short := 20;", f"TERM short := FUNCTION {formula};")
+    answer = infer(_system(text), {"dirt": -7.0, "load": 9.0}).outputs[0]
+    assert answer == at_minus_7
+
+
+def test_a_difference_of_sigmoids_below_0_spans_what_both_span() -> None:
+    text = JFUZZYLOGIC.replace("TRIAN 10 15 20", "DSIGM -3 12 -1 18")
+    tip = _system(text).outputs[0]
+    assert (tip.low, tip.high) == (1.0, 27.0)  # 5 - 4 deviations, and 18 + 9 / 1
+
+
+def test_a_block_without_accu_sums_in_jfuzzylogic_beside_one_that_says_it() -> None:
+    first, rest = JFUZZYLOGIC.split("  OR : ASUM;")
+    other = "RULEBLOCK No2 ACCU : MAX; RULE 1 : IF food IS bad THEN tip IS large; "
+    text = f"{first}  OR : ASUM;{rest}".replace(
+        "END_RULEBLOCK", f"END_RULEBLOCK {other} END_RULEBLOCK", 1
+    )
+    reading = _read(text)
+    assert isinstance(reading.model, FuzzySystem)
+    assert reading.model.outputs[0].aggregation == "sum"
+    what = "its blocks say different ACCU; sum is taken for all rules"
+    assert Loss("output 'tip'", what) in reading.losses
+
+
+def test_a_step_beside_a_sample_that_jfuzzylogic_adds_up_is_a_loss() -> None:
+    # 500 times 0.002 added to -1 ends above 0, and -1 + 500 * 0.002 is 0.
+    text = JFUZZYLOGIC.replace("GAUSS 5 1", "TRIAN -0.5 0 0")
+    text = text.replace("TRIAN 10 15 20", "TRAPE -1 -1 1 1")
+    (_, loss) = _read(text).losses
+    assert loss.where == "term 'small' of 'tip'"
+    added = 8.743006318923108e-16
+    assert loss.what == (
+        f"its degree is 1.0 at 0.0, and 0.0 at {added!r}, where jFuzzyLogic looks, "
+        "which adds up steps; a side with some width is safe"
+    )
+    wide = text.replace("TRIAN -0.5 0 0", "TRIAN -0.5 0 0.1")
+    assert len(_read(wide).losses) == 1  # the other function block
+
+
 def test_a_difference_of_sigmoids_is_cut_off_at_0_as_in_jfuzzylogic() -> None:
     reading = _read(STANDARD.replace("(2, 0) (6, 1)", "DSIGM 2 5 2 1"))
     assert reading.losses == ()

@@ -9,6 +9,7 @@ reads it. `docs/reference/fcl.md` lists the differences.
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
@@ -45,6 +46,7 @@ from fuzzytree.formats.fcl.fcl_syntax import (
 )
 from fuzzytree.formats.fll.fll_differences import constant_degrees, fuzzylite_losses
 from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree
+from fuzzytree.formats.formulas import FUZZYLITE, JFUZZYLOGIC
 from fuzzytree.formats.text_files import (
     PartError,
     PositionGroup,
@@ -66,8 +68,14 @@ from fuzzytree.model import (
     Term,
     Variable,
     name_choice,
+    sampled_values,
 )
-from fuzzytree.semantics import as_rules, joined_by_number, with_flanks
+from fuzzytree.semantics import (
+    as_rules,
+    curve_degree,
+    joined_by_number,
+    with_flanks,
+)
 
 FACTS = " facts "
 """How the comment begins that says what rules have no place for in a system."""
@@ -128,6 +136,8 @@ def read_fcl(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
         system = FuzzySystem(title or "system", inputs, outputs, rules)
     except InvalidModelError as error:
         raise report(name, placed(positions(), error.mistakes)) from error
+    if dialect == "jfuzzylogic":
+        _note_jumps(system, notes)
     model, facts = _model(joined_by_number(system), text.text, notes)
     written_as = "iec" if dialect == "pyit2fls" else dialect  # which PyIT2FLS reads
     if not is_certain:
@@ -189,7 +199,11 @@ def _aggregated(
     """
     own = known.outputs[output.name].block
     stated = [None if own is None else norm_of(own, "ACCU", FCL_SNORMS, known.notes)]
-    stated += [one.accu for one in blocks if output.name in one.concluded]
+    accus = [one.accu for one in blocks if output.name in one.concluded]
+    if any(accus):  # a block that says none does not take that of another one
+        is_sum = output.defuzzifier.is_weighted or known.dialect == "jfuzzylogic"
+        accus = [one or ("sum" if is_sum else "maximum") for one in accus]
+    stated += accus
     norms = [one for one in stated if one is not None]
     where = f"output {output.name!r}"
     if len(set(norms)) > 1:
@@ -216,6 +230,37 @@ def _aggregated(
             what = "ACCU is missing: MAX is taken, and jFuzzyLogic takes SUM"
             known.notes.loss(where, f"{what}; {CHOICE}")
     return replace(output, aggregation="maximum")
+
+
+_SAME = 1e-9  # degrees that differ by more make other answers
+
+
+def _note_jumps(system: FuzzySystem, notes: ReaderNotes) -> None:
+    """Note the terms that jump between a sample and the one of jFuzzyLogic.
+
+    It adds the step to the sample before, and rounds each time.
+    """
+    concluded = {(one.output, one.term) for rule in system.rules for one in rule.then}
+    for output in system.outputs:
+        if output.defuzzifier.is_weighted:
+            continue
+        low, high = output.low or 0.0, output.high or 0.0
+        samples = sampled_values(output)
+        steps = [(high - low) / len(samples)] * (len(samples) - 1)
+        pairs = list(zip(samples, itertools.accumulate([low, *steps]), strict=True))
+        for term in output.terms:
+            curve = term.function
+            knots = curve.knots() if (output.name, term.name) in concluded else ()
+            for pair in pairs:
+                if not any(min(pair) <= knot <= max(pair) for knot in knots):
+                    continue
+                ours, theirs = (curve_degree(curve, value) for value in pair)
+                if abs(ours - theirs) > _SAME:
+                    what = f"its degree is {ours!r} at {pair[0]!r}, and {theirs!r} at "
+                    what += f"{pair[1]!r}, where jFuzzyLogic looks, which adds up steps"
+                    where = f"term {term.name!r} of {output.name!r}"
+                    notes.loss(where, f"{what}; a side with some width is safe")
+                    break
 
 
 _REAL = frozenset({"REAL", "LREAL", "FLOAT"})
@@ -317,7 +362,9 @@ def _terms(
     results: list[FllTerm] = []
     earlier: set[str] = set()
     names = (*known.inputs, *known.outputs)
-    where = TermScope(name, tuple(known.inputs), names, is_weighted)
+    operators = FUZZYLITE if known.dialect == "fuzzylite" else JFUZZYLOGIC
+    inputs = tuple(known.inputs)
+    where = TermScope(name, inputs, names, is_weighted, operators=operators)
     for text in block.terms if block is not None else ():
         label = str(text.name)
         if label in earlier:
@@ -365,7 +412,7 @@ def read_output(name: str, known: FclVariables) -> SystemOutput:
     if known.dialect != "fuzzylite":
         _check_kinds(block.terms, terms, known, is_weighted=how.is_weighted)
     if not how.is_weighted and (low is None or high is None):
-        low, high = _estimated(named, labels, known)
+        low, high = _estimated(named, block.terms, labels, known)
     result = SystemOutput(
         name=name,
         terms=labels,
@@ -405,13 +452,19 @@ def _check_kinds(
 
 
 def _estimated(
-    named: FclVariable, labels: Iterable[Term], known: FclVariables
+    named: FclVariable,
+    texts: Iterable[TermStatement],
+    labels: Iterable[Term],
+    known: FclVariables,
 ) -> tuple[float, float]:
     """Return the range that an output's terms span, where the file says none."""
     name = str(named.token)
     if known.notes.mistakes:  # a term that was not read is no reason to demand a range
         return 0.0, 1.0
-    ends = [fcl_terms.extent(label.function) for label in labels]
+    ends = [
+        fcl_terms.extent(text, label.function)
+        for text, label in zip(texts, labels, strict=True)
+    ]
     spans = [one for one in ends if one is not None]
     if not spans or known.dialect == "fuzzylite":
         known.mistake(named.token, f"output {name!r} needs a RANGE for its METHOD")
@@ -419,7 +472,8 @@ def _estimated(
     low = min(low for low, _ in spans) if named.low is None else named.low
     high = max(high for _, high in spans) if named.high is None else named.high
     if not low < high:
-        known.mistake(named.token, f"output {name!r} needs a RANGE for its METHOD")
+        sentence = f"output {name!r} needs a RANGE for its METHOD; its terms span "
+        known.mistake(named.token, f"{sentence}{low!r} .. {high!r}")
         return 0.0, 1.0
     text = f"output {name!r}: RANGE is missing; its terms span {low!r} .. {high!r}"
     known.notes.remark(text)

@@ -8,7 +8,7 @@ from typing import Final
 
 import msgspec
 
-from fuzzytree.formats.formulas import FormulaError, parse
+from fuzzytree.formats.formulas import FUZZYLITE, FormulaError, Operators, parse
 from fuzzytree.formats.text_files import FileMistake, PartError, Word, number_of
 from fuzzytree.formats.words import (
     FunctionWord,
@@ -41,6 +41,7 @@ class TermScope(msgspec.Struct, frozen=True):
         names: The names of all variables.
         is_weighted: Whether its variable is an output of weighted numbers.
         is_inverse: Whether a weighted output takes where monotone terms have a degree.
+        operators: What those of formulas mean.
     """
 
     variable: str
@@ -48,6 +49,7 @@ class TermScope(msgspec.Struct, frozen=True):
     names: Collection[str]
     is_weighted: bool = False
     is_inverse: bool = False
+    operators: Operators = FUZZYLITE
 
 
 class FllTerm(msgspec.Struct, frozen=True):
@@ -161,7 +163,8 @@ def _function(
         sentence = "'x' in a formula is the value itself; rename the variable 'x'"
         raise _error(rest[0], sentence)
     try:
-        return curves.Formula(parse(formula, place.names))
+        expression = parse(formula, place.names, operators=place.operators)
+        return curves.Formula(expression)
     except FormulaError as error:
         column = rest[0].column + error.column - 1
         raise PartError((rest[0].line, column, error.sentence)) from error
