@@ -104,6 +104,25 @@ def test_only_cr_and_lf_end_a_comment(mark: str) -> None:
     assert system_of(TIPPER.replace("# A comment", hidden)) == system_of(TIPPER)
 
 
+def test_the_words_of_fuzzylite_5_are_read_as_fuzzylite_6_takes_them() -> None:
+    old = TIPPER.replace("  aggregation: Maximum", "  accumulation: Maximum")
+    old = old.replace("lock-previous: false", "lock-valid: false")
+    old = old.replace("  implication: Alg", "  activation: Alg").replace(
+        "Highest 2", ""
+    )
+    reading = read_fll(old.replace("  activation: \n", "").encode(), "tipper.fll")
+    new = TIPPER.replace("Highest 2", "General")
+    assert reading.model == system_of(new)
+    assert [one for one in reading.remarks if "fuzzylite 5" in one] == [
+        f"line {line}: {was!r} of fuzzylite 5 is read as {now!r}, as in fuzzylite 6"
+        for line, was, now in (
+            (16, "accumulation", "aggregation"),
+            (19, "lock-valid", "lock-previous"),
+            (31, "activation", "implication"),
+        )
+    ]
+
+
 def test_every_word_of_a_file_is_in_the_system() -> None:
     reading = read_fll(TIPPER.encode(), "tipper.fll")
     system = reading.model

@@ -159,15 +159,8 @@ def shape_in_fcl(curve: Curve) -> tuple[str, Sequence[float]] | None:
             return in_words(curve, FCL_SHAPES)
 
 
-def extent(text: TermStatement, curve: Curve) -> tuple[float, float] | None:
+def extent(curve: Curve) -> tuple[float, float] | None:
     """Return the range that jFuzzyLogic takes for a term; None if there is none."""
-    if text.tokens[0].upper() == "DSIGM":  # read as a formula if it falls below 0
-        numbers = [_number(one) for one in text.tokens[1:]]
-        curve = FCL_SHAPES["DSIGM"].make(numbers, "fuzzylite")
-    return _extent(curve)
-
-
-def _extent(curve: Curve) -> tuple[float, float] | None:
     match curve:
         case Points(values=values):
             return values[0], values[-1]
@@ -188,7 +181,7 @@ def _extent(curve: Curve) -> tuple[float, float] | None:
             curves.SigmoidDifference(first=first, second=second)
             | curves.SigmoidProduct(first=first, second=second)
         ):
-            ends = [one for one in (_extent(first), _extent(second)) if one is not None]
+            ends = [one for one in (extent(first), extent(second)) if one is not None]
             return min(low for low, _ in ends), max(high for _, high in ends)
         case curves.Cosine(center=center, width=width):
             return center - width / 2.0, center + width / 2.0

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, TypeVar, get_args
 
 import msgspec
+from msgspec.structs import replace
 
 from fuzzytree.formats.text_files import (
     LONGEST_NAME,
@@ -141,6 +142,7 @@ def read_page(text: str, notes: ReaderNotes) -> FllFile:
         entry = _entry(content, number, notes)
         if entry is None or _is_too_long(entry, notes):
             continue
+        entry = _current(entry, notes)
         if entry.key in KEYS:
             heads.append((entry, []))
         elif _belongs(entry, heads, notes):
@@ -161,6 +163,20 @@ def _entry(text: str, line: int, notes: ReaderNotes) -> FllEntry | None:
         return None
     start = len(key) + 2 + len(value) - len(value.lstrip())
     return FllEntry(key.strip(), value.strip(), line, column, start)
+
+
+_OLD_KEYS = {"accumulation": "aggregation", "lock-valid": "lock-previous"}
+
+
+def _current(entry: FllEntry, notes: ReaderNotes) -> FllEntry:
+    """Return an entry of fuzzylite 5 under the key that fuzzylite 6 takes it for."""
+    key = _OLD_KEYS.get(entry.key, entry.key)
+    if key == "activation" and entry.value in FLL_TNORMS:
+        key = "implication"
+    if key != entry.key:
+        what = f"{entry.key!r} of fuzzylite 5 is read as {key!r}, as in fuzzylite 6"
+        notes.remark(f"line {entry.line}: {what}")
+    return replace(entry, key=key)
 
 
 def _is_too_long(entry: FllEntry, notes: ReaderNotes) -> bool:
