@@ -184,7 +184,7 @@ def test_a_resolution_that_a_file_leaves_out_is_that_of_the_named_engine() -> No
         ("som", 0, "matlab", ""),
         ("lom", -9, "octave", ""),
         ("mom", -9, "matlab", ""),
-        ("bisector", 0, "fuzzylite", ""),
+        ("bisector", 0, "fuzzylite", "fuzzylite 6's bisector lies between two samples"),
     ],
 )
 def test_a_method_of_one_engine_alone_is_a_loss(

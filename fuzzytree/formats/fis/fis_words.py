@@ -77,6 +77,8 @@ def method_loss(
         case "matlab", "bisector":
             what = "MATLAB's bisector is the first sample with half of the area"
             return f"{what}, and here the nearest to it"
+        case "fuzzylite", "bisector":
+            return "fuzzylite 6's bisector lies between two samples, and here on one"
         case "matlab", ("smallest of maximum" | "largest of maximum"):
             size = method.partition(" ")[0]
             word = {"smallest": "som", "largest": "lom"}[size]
