@@ -125,10 +125,7 @@ class _Grown(msgspec.Struct, frozen=True):
 
 
 def parse(
-    text: str,
-    names: Collection[str] | None = None,
-    *,
-    operators: Operators = FUZZYLITE,
+    text: str, names: Collection[str] | None = None, operators: Operators = FUZZYLITE
 ) -> Expression:
     """Return the expression of a formula.
 

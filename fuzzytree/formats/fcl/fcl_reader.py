@@ -200,10 +200,9 @@ def _aggregated(
     own = known.outputs[output.name].block
     stated = [None if own is None else norm_of(own, "ACCU", FCL_SNORMS, known.notes)]
     accus = [one.accu for one in blocks if output.name in one.concluded]
+    is_sum = output.defuzzifier.is_weighted or known.dialect == "jfuzzylogic"
     if any(accus):  # a block that says none does not take that of another one
-        is_sum = output.defuzzifier.is_weighted or known.dialect == "jfuzzylogic"
-        accus = [one or ("sum" if is_sum else "maximum") for one in accus]
-    stated += accus
+        stated += [one or ("sum" if is_sum else "maximum") for one in accus]
     norms = [one for one in stated if one is not None]
     where = f"output {output.name!r}"
     if len(set(norms)) > 1:
@@ -232,35 +231,26 @@ def _aggregated(
     return replace(output, aggregation="maximum")
 
 
-_SAME = 1e-9  # degrees that differ by more make other answers
-
-
 def _note_jumps(system: FuzzySystem, notes: ReaderNotes) -> None:
-    """Note the terms that jump between a sample and the one of jFuzzyLogic.
-
-    It adds the step to the sample before, and rounds each time.
-    """
-    concluded = {(one.output, one.term) for rule in system.rules for one in rule.then}
+    """Note terms that differ at jFuzzyLogic's samples, which add up rounded steps."""
     for output in system.outputs:
         if output.defuzzifier.is_weighted:
             continue
-        low, high = output.low or 0.0, output.high or 0.0
         samples = sampled_values(output)
-        steps = [(high - low) / len(samples)] * (len(samples) - 1)
-        pairs = list(zip(samples, itertools.accumulate([low, *steps]), strict=True))
+        step = ((output.high or 0.0) - samples[0]) / len(samples)
+        sums = [*itertools.accumulate([samples[0], *[step] * (len(samples) - 1)])]
         for term in output.terms:
-            curve = term.function
-            knots = curve.knots() if (output.name, term.name) in concluded else ()
-            for pair in pairs:
-                if not any(min(pair) <= knot <= max(pair) for knot in knots):
-                    continue
-                ours, theirs = (curve_degree(curve, value) for value in pair)
-                if abs(ours - theirs) > _SAME:
-                    what = f"its degree is {ours!r} at {pair[0]!r}, and {theirs!r} at "
-                    what += f"{pair[1]!r}, where jFuzzyLogic looks, which adds up steps"
-                    where = f"term {term.name!r} of {output.name!r}"
-                    notes.loss(where, f"{what}; a side with some width is safe")
-                    break
+            curve, knots = term.function, term.function.knots()
+            jumps = [
+                (one, two)
+                for one, two in zip(samples, sums, strict=True)
+                if any(min(one, two) <= knot <= max(one, two) for knot in knots)
+                and abs(curve_degree(curve, one) - curve_degree(curve, two)) > 1e-9
+            ]
+            for one, two in jumps[:1]:
+                what = f"it jumps between {one!r} and {two!r}, where jFuzzyLogic looks,"
+                what += " which adds up steps; a side with some width is safe"
+                notes.loss(f"term {term.name!r} of {output.name!r}", what)
 
 
 _REAL = frozenset({"REAL", "LREAL", "FLOAT"})
@@ -412,7 +402,7 @@ def read_output(name: str, known: FclVariables) -> SystemOutput:
     if known.dialect != "fuzzylite":
         _check_kinds(block.terms, terms, known, is_weighted=how.is_weighted)
     if not how.is_weighted and (low is None or high is None):
-        low, high = _estimated(named, block.terms, labels, known)
+        low, high = _estimated(named, labels, known)
     result = SystemOutput(
         name=name,
         terms=labels,
@@ -452,28 +442,21 @@ def _check_kinds(
 
 
 def _estimated(
-    named: FclVariable,
-    texts: Iterable[TermStatement],
-    labels: Iterable[Term],
-    known: FclVariables,
+    named: FclVariable, labels: Iterable[Term], known: FclVariables
 ) -> tuple[float, float]:
     """Return the range that an output's terms span, where the file says none."""
     name = str(named.token)
     if known.notes.mistakes:  # a term that was not read is no reason to demand a range
         return 0.0, 1.0
-    ends = [
-        fcl_terms.extent(text, label.function)
-        for text, label in zip(texts, labels, strict=True)
-    ]
+    ends = [fcl_terms.extent(label.function) for label in labels]
     spans = [one for one in ends if one is not None]
-    if not spans or known.dialect == "fuzzylite":
+    if not spans or len(spans) < len(ends) or known.dialect == "fuzzylite":
         known.mistake(named.token, f"output {name!r} needs a RANGE for its METHOD")
         return 0.0, 1.0
     low = min(low for low, _ in spans) if named.low is None else named.low
     high = max(high for _, high in spans) if named.high is None else named.high
     if not low < high:
-        sentence = f"output {name!r} needs a RANGE for its METHOD; its terms span "
-        known.mistake(named.token, f"{sentence}{low!r} .. {high!r}")
+        known.mistake(named.token, f"output {name!r} needs a RANGE for its METHOD")
         return 0.0, 1.0
     text = f"output {name!r}: RANGE is missing; its terms span {low!r} .. {high!r}"
     known.notes.remark(text)

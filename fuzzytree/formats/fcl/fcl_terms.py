@@ -21,8 +21,6 @@ from fuzzytree.formats.words import (
     in_words,
 )
 from fuzzytree.model import (
-    LR,
-    Band,
     Curve,
     Points,
     Term,
@@ -187,7 +185,5 @@ def extent(curve: Curve) -> tuple[float, float] | None:
             return center - width / 2.0, center + width / 2.0
         case curves.PiCurve(a=a, d=d):
             return a, d
-        case curves.Singleton(value=value):
-            return value, value
-        case Band() | LR() | _:
+        case _:
             return None

@@ -163,8 +163,7 @@ def _function(
         sentence = "'x' in a formula is the value itself; rename the variable 'x'"
         raise _error(rest[0], sentence)
     try:
-        expression = parse(formula, place.names, operators=place.operators)
-        return curves.Formula(expression)
+        return curves.Formula(parse(formula, place.names, place.operators))
     except FormulaError as error:
         column = rest[0].column + error.column - 1
         raise PartError((rest[0].line, column, error.sentence)) from error
