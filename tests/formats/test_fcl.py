@@ -665,6 +665,12 @@ END_RULEBLOCK
     ("old", "new", "expected"),
     [
         ("END_VAR\n  VAR_OUT", "\n  VAR_OUT", "found 'VAR_OUTPUT'; expected END_VAR"),
+        (
+            "FUZZIFY load",
+            "FUZZIFY minutes",
+            "no variable 'minutes' in VAR_INPUT; it is an output, whose terms stand in "
+            "DEFUZZIFY",
+        ),
         ("FUZZIFY load", "FUZZIFY lod", "no variable 'lod' in VAR_INPUT"),
         ("METHOD : COGS", "METHOD : COG", "a number has no area"),
         ("TERM long := 60", "TERM long := (1, 0)", "a curve where METHOD needs"),

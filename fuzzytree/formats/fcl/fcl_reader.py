@@ -322,6 +322,8 @@ def _describe(
     if name not in variables:
         kind = "VAR_INPUT" if block.kind == "FUZZIFY" else "VAR_OUTPUT"
         choice = name_choice(name[:99], variables)
+        if name in known.outputs:
+            choice = "it is an output, whose terms stand in DEFUZZIFY"
         known.mistake(token, f"no variable {name!r} in {kind}; {choice}")
         return
     if variables[name].block is not None:
