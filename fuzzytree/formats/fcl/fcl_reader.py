@@ -199,10 +199,10 @@ def _aggregated(
     """
     own = known.outputs[output.name].block
     stated = [None if own is None else norm_of(own, "ACCU", FCL_SNORMS, known.notes)]
-    accus = [one.accu for one in blocks if output.name in one.concluded]
+    accus = [block.accu for block in blocks if output.name in block.concluded]
     is_sum = output.defuzzifier.is_weighted or known.dialect == "jfuzzylogic"
     if any(accus):  # a block that says none does not take that of another one
-        stated += [one or ("sum" if is_sum else "maximum") for one in accus]
+        stated += [accu or ("sum" if is_sum else "maximum") for accu in accus]
     norms = [one for one in stated if one is not None]
     where = f"output {output.name!r}"
     if len(set(norms)) > 1:
@@ -242,14 +242,14 @@ def _note_jumps(system: FuzzySystem, notes: ReaderNotes) -> None:
         for term in output.terms:
             curve, knots = term.function, term.function.knots()
             jumps = [
-                (one, two)
-                for one, two in zip(samples, sums, strict=True)
-                if any(min(one, two) <= knot <= max(one, two) for knot in knots)
-                and abs(curve_degree(curve, one) - curve_degree(curve, two)) > 1e-9
+                (x, step_sum)
+                for x, step_sum in zip(samples, sums, strict=True)
+                if any(min(x, step_sum) <= knot <= max(x, step_sum) for knot in knots)
+                and abs(curve_degree(curve, x) - curve_degree(curve, step_sum)) > 1e-9
             ]
-            for one, two in jumps[:1]:
-                what = f"it jumps between {one!r} and {two!r}, where jFuzzyLogic looks,"
-                what += " which adds up steps; a side with some width is safe"
+            for x, step_sum in jumps[:1]:
+                what = f"it jumps between {x!r} and {step_sum!r}, where jFuzzyLogic "
+                what += "looks, which adds up steps; a side with some width is safe"
                 notes.loss(f"term {term.name!r} of {output.name!r}", what)
 
 
