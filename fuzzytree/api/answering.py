@@ -21,7 +21,6 @@ from fuzzytree.model import (
     Fitted,
     FloatArray,
     FuzzySystem,
-    FuzzyTree,
     Model,
     ModelSource,
     Runtime,
@@ -41,7 +40,7 @@ from fuzzytree.runtimes import (
     open_onnx,
     outputs_of,
 )
-from fuzzytree.semantics import rules_from_tree
+from fuzzytree.semantics import rules_of
 from fuzzytree.tables import Batch, TableSource, batches, in_order
 
 T = TypeVar("T")
@@ -259,7 +258,7 @@ def _rated(model: Document | OnnxModel) -> Document | OnnxModel:
         return model
     if isinstance(model, FuzzySystem) or not model.semantics.sharpness:
         raise ValueError(f"{model.name} has no probabilities of classes")
-    return rules_from_tree(model) if isinstance(model, FuzzyTree) else model
+    return rules_of(model)
 
 
 def _answering_onnx(

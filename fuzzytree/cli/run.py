@@ -34,11 +34,10 @@ from fuzzytree.errors import TableError
 from fuzzytree.files import open_atomically
 from fuzzytree.model import (
     FuzzySystem,
-    FuzzyTree,
     checkpoint,
     printable_json,
 )
-from fuzzytree.semantics import rules_from_tree
+from fuzzytree.semantics import rules_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -117,8 +116,8 @@ def command(options: RunOptions) -> None:
         raise click.UsageError("--safe-csv is about CSV, and --json writes none")
     found = api.opened(options.model, allow_loss=options.allow_loss)
     reason = _reasons(options.model, found) if options.why else None
-    if options.strengths and isinstance(found, FuzzyTree):
-        found = rules_from_tree(found)
+    if options.strengths and not isinstance(found, OnnxModel):
+        found = rules_of(found)
     if options.strengths == "class" and not found.classes:
         raise click.UsageError(
             f"--strengths class: {found.name} is a fuzzy system, which decides for no "
@@ -262,7 +261,7 @@ def _reasons(
         raise click.UsageError(
             f"--why: {path} does not contain the rules as text; run the YAML file"
         )
-    rules = rules_from_tree(model) if isinstance(model, FuzzyTree) else model
+    rules = rules_of(model)
 
     def reason(batch: Batch, found: Predictions | Outputs) -> list[str]:
         if isinstance(rules, FuzzySystem):

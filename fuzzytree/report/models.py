@@ -41,7 +41,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.report.text import aligned, counted, number
 from fuzzytree.runtimes import Facts, OnnxModel, Outputs
-from fuzzytree.semantics import Status, rules_from_tree
+from fuzzytree.semantics import Status, rules_of
 
 _MOST_PAIRS = 6  # points that a line of text shows one by one
 _MOST_PARTS = 12  # of a combination, where it must fit into a line
@@ -62,18 +62,13 @@ def model_lines(model: Document) -> Iterator[str]:
     if isinstance(model, FuzzyTree):
         yield from tree_lines(model)
         yield ""
-    rules = _as_rules(model).rules
+    rules = rules_of(model).rules
     width = len(str(len(rules)))
     for position, rule in enumerate(rules, 1):
         rows = f"  {counted(rule.support, 'row')}" if rule.support is not None else ""
         yield f"{position:{width}}. {sentence(rule)}{rows}"
     yield ""
     yield from term_lines(model.variables)
-
-
-def _as_rules(model: FuzzyTree | RuleBase) -> RuleBase:
-    """Return a rule base as it is, and the relative rules of a tree."""
-    return rules_from_tree(model) if isinstance(model, FuzzyTree) else model
 
 
 def rule_facts(model: Document) -> list[dict[str, object]]:
@@ -85,7 +80,7 @@ def rule_facts(model: Document) -> list[dict[str, object]]:
         ]
     return [
         {"number": k, "text": sentence(r), "class": r.then, "rows": r.support}
-        for k, r in enumerate(_as_rules(model).rules, 1)
+        for k, r in enumerate(rules_of(model).rules, 1)
     ]
 
 

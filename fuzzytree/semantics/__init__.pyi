@@ -46,6 +46,7 @@ from .inference.degrees import value_at as value_at
 from .lowering import Form as Form
 from .lowering import forms as forms
 from .lowering import rules_from_tree as rules_from_tree
+from .lowering import rules_of as rules_of
 from .probing import SPECIAL as SPECIAL
 from .probing import Aim as Aim
 from .probing import Row as Row

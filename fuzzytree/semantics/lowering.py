@@ -21,6 +21,7 @@ from fuzzytree.model import (
     Branch,
     Conjunction,
     Document,
+    FuzzySystem,
     FuzzyTree,
     Kind,
     Proposition,
@@ -80,6 +81,26 @@ def forms(
         if kind in wanted:
             result[TITLES[kind]] = rules_from_tree(model, kind)
     return result
+
+
+@overload
+def rules_of(model: FuzzyTree | RuleBase) -> RuleBase: ...
+
+
+@overload
+def rules_of(model: Document) -> RuleBase | FuzzySystem: ...
+
+
+def rules_of(model: Document) -> RuleBase | FuzzySystem:
+    """Return a model as rules: the relative rules of a tree, anything else as it is.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_of(random_tree(1))
+        >>> rules_of(rules) is rules
+        True
+    """
+    return rules_from_tree(model) if isinstance(model, FuzzyTree) else model
 
 
 def rules_from_tree(

@@ -48,7 +48,7 @@ from fuzzytree.model import (
     shapes_of,
 )
 from fuzzytree.semantics.inference.degrees import curve_degree, hedged
-from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.lowering import rules_of
 from fuzzytree.semantics.reference import axis_values
 
 SPECIAL = (
@@ -90,7 +90,7 @@ def probes(
         A value for each input in each row: landmarks first, then 100 random rows,
         then each of `SPECIAL` in each input.
     """
-    rules = model if isinstance(model, RuleBase) else rules_from_tree(model)
+    rules = rules_of(model)
     chance = random.Random(seed)
     maker = _Maker(rules, chance)
     tail = [maker.draw() for _ in range(_RANDOM_ROWS)]
