@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from typing import Final, Literal
+from typing import ClassVar, Final, Literal
 
 import msgspec
 
@@ -145,6 +145,12 @@ class RuleBase(Value, frozen=True):
     kind: Kind | None = None
     columns: tuple[str, ...] = ()
 
+    outputs: ClassVar[tuple[()]] = ()  # its answers are classes
+    blocks: ClassVar[tuple[()]] = ()  # its rules stand alone
+    nodes: ClassVar[tuple[()]] = ()
+    sets: ClassVar[tuple[()]] = ()
+    note: ClassVar[str] = ""
+
     def __post_init__(self) -> None:
         """Refuse a rule base that contradicts itself."""
         refuse(
@@ -163,21 +169,6 @@ class RuleBase(Value, frozen=True):
     def inputs(self) -> tuple[str, ...]:
         """The names of the columns that the rules need, in order."""
         return tuple(v.name for v in self.variables if not v.parts)
-
-    @property
-    def outputs(self) -> tuple[()]:
-        """The numbers that it computes: none, its answers are classes."""
-        return ()
-
-    @property
-    def blocks(self) -> tuple[()]:
-        """The blocks of a system's rules: none, its rules stand alone."""
-        return ()
-
-    @property
-    def sets(self) -> tuple[()]:
-        """The fitted sets that it keeps beside its terms: none."""
-        return ()
 
     @property
     def rule_labels(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import importlib
 import math
 import re
 from collections.abc import Iterator, Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from fuzzytree.model.curves import (
     Expression,
@@ -33,7 +33,7 @@ from fuzzytree.model.mistakes import (
     text_fault,
 )
 from fuzzytree.model.norms import SNorm
-from fuzzytree.model.rulebase import summary
+from fuzzytree.model.rulebase import Semantics, summary
 from fuzzytree.model.rules import (
     Conclusion,
     RuleBlock,
@@ -192,6 +192,13 @@ class FuzzySystem(Value, frozen=True):
     blocks: tuple[RuleBlock, ...]
     note: str = ""
 
+    classes: ClassVar[tuple[str, ...]] = ()  # its answers are numbers
+    rule_labels: ClassVar[tuple[str, ...]] = ()
+    columns: ClassVar[tuple[str, ...]] = ()  # it is learnt from no table
+    nodes: ClassVar[tuple[()]] = ()
+    sets: ClassVar[tuple[()]] = ()
+    semantics: ClassVar[Semantics] = Semantics()  # no class, whatever is missing
+
     def __post_init__(self) -> None:
         """Refuse a system that contradicts itself."""
         refuse(_system_mistakes(self))
@@ -202,16 +209,6 @@ class FuzzySystem(Value, frozen=True):
         return tuple(one.name for one in self.variables if not one.parts)
 
     @property
-    def columns(self) -> tuple[str, ...]:
-        """The columns of the training table: none, it is learnt from no table."""
-        return ()
-
-    @property
-    def classes(self) -> tuple[str, ...]:
-        """The possible answers: none, its answers are numbers."""
-        return ()
-
-    @property
     def all_variables(self) -> tuple[Variable | SystemOutput, ...]:
         """The inputs and combinations, then the outputs."""
         return (*self.variables, *self.outputs)
@@ -220,16 +217,6 @@ class FuzzySystem(Value, frozen=True):
     def rules(self) -> tuple[SystemRule, ...]:
         """The rules of all blocks, in order."""
         return tuple(rule for block in self.blocks for rule in block.rules)
-
-    @property
-    def sets(self) -> tuple[()]:
-        """The fitted sets that it keeps beside its terms: none."""
-        return ()
-
-    @property
-    def rule_labels(self) -> tuple[str, ...]:
-        """The class of each rule: none, its answers are numbers."""
-        return ()
 
     def rule_path(self, number: int) -> Path:
         """Return where the rule of a number, from 1 over all blocks, stands."""

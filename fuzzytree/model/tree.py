@@ -12,7 +12,7 @@ import importlib
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Literal
+from typing import ClassVar, Literal
 
 import msgspec
 
@@ -129,6 +129,11 @@ class FuzzyTree(Value, frozen=True):
     semantics: Semantics = Semantics()
     columns: tuple[str, ...] = ()
 
+    outputs: ClassVar[tuple[()]] = ()  # its answers are classes
+    rules: ClassVar[tuple[()]] = ()  # one path is followed
+    blocks: ClassVar[tuple[()]] = ()
+    note: ClassVar[str] = ""
+
     def __post_init__(self) -> None:
         """Refuse a tree that contradicts itself."""
         refuse(
@@ -150,21 +155,6 @@ class FuzzyTree(Value, frozen=True):
     def inputs(self) -> tuple[str, ...]:
         """The names of the columns that the tree needs, in order."""
         return tuple(v.name for v in self.variables if not v.parts)
-
-    @property
-    def outputs(self) -> tuple[()]:
-        """The numbers that it computes: none, its answers are classes."""
-        return ()
-
-    @property
-    def rules(self) -> tuple[()]:
-        """The rules that fire for a row: none, for one path is followed."""
-        return ()
-
-    @property
-    def blocks(self) -> tuple[()]:
-        """The blocks of a system's rules: none."""
-        return ()
 
     @property
     def rule_labels(self) -> tuple[str, ...]:
