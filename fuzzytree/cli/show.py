@@ -77,30 +77,25 @@ def command(options: ShowOptions) -> None:
 
 def _draw(model: Document, picture: str) -> None:
     from fuzzytree import report
-    from fuzzytree.model import FuzzyTree
 
     with wrong_options():
-        if isinstance(model, FuzzyTree):
-            report.draw_tree(model).save(picture)
-        else:
-            report.draw_terms(model).save(picture)
+        draw = report.draw_tree if model.leaves else report.draw_terms
+        draw(model).save(picture)
 
 
 def _facts(found: Reading) -> dict[str, object]:
     import msgspec
 
     from fuzzytree import report
-    from fuzzytree.model import FuzzySystem, fingerprint, kind_of
+    from fuzzytree.model import fingerprint, kind_of
 
     model = found.model
-    outputs = {}
-    if isinstance(model, FuzzySystem):
-        outputs = {"outputs": [one.name for one in model.outputs]}
+    outputs = {"outputs": [output.name for output in model.outputs]}
     return {
         "carrier": kind_of(model),
         "fingerprint": fingerprint(model),
         "inputs": model.inputs,
-        **outputs,
+        **(outputs if model.outputs else {}),
         "rules": report.rule_facts(model),
         "losses": found.losses,
         "remarks": found.remarks,

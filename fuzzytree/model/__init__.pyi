@@ -98,6 +98,10 @@ from .naming import printable as printable
 from .naming import printable_json as printable_json
 from .naming import printable_lines as printable_lines
 from .naming import unlike as unlike
+from .nodes import Branch as Branch
+from .nodes import Leaf as Leaf
+from .nodes import Node as Node
+from .nodes import Sets as Sets
 from .norms import KEEPS_UNIT as KEEPS_UNIT
 from .norms import S_NORMS as S_NORMS
 from .norms import T_NORMS as T_NORMS
@@ -160,11 +164,7 @@ from .system import Grid as Grid
 from .system import SystemOutput as SystemOutput
 from .system import is_drawn_by_lines as is_drawn_by_lines
 from .system import sampled_values as sampled_values
-from .tree import Branch as Branch
 from .tree import FuzzyTree as FuzzyTree
-from .tree import Leaf as Leaf
-from .tree import Node as Node
-from .tree import Sets as Sets
 from .tree import Use as Use
 from .tree import depth as depth
 from .tree import interval_names as interval_names

@@ -26,6 +26,7 @@ from fuzzytree.model.mistakes import name_choice as name_choice
 from fuzzytree.model.mistakes import name_mistakes as name_mistakes
 from fuzzytree.model.mistakes import refuse as refuse
 from fuzzytree.model.mistakes import text_fault as text_fault
+from fuzzytree.model.nodes import Leaf, Node, Sets
 from fuzzytree.model.probabilities import (
     Probabilities,
     probability_mistakes,
@@ -147,8 +148,9 @@ class RuleBase(Value, frozen=True):
 
     outputs: ClassVar[tuple[()]] = ()  # its answers are classes
     blocks: ClassVar[tuple[()]] = ()  # its rules stand alone
-    nodes: ClassVar[tuple[()]] = ()
-    sets: ClassVar[tuple[()]] = ()
+    nodes: ClassVar[tuple[Node, ...]] = ()
+    leaves: ClassVar[tuple[Leaf, ...]] = ()
+    sets: ClassVar[tuple[Sets, ...]] = ()
     note: ClassVar[str] = ""
 
     def __post_init__(self) -> None:

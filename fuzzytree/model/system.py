@@ -32,6 +32,7 @@ from fuzzytree.model.mistakes import (
     refuse,
     text_fault,
 )
+from fuzzytree.model.nodes import Leaf, Node, Sets
 from fuzzytree.model.norms import SNorm
 from fuzzytree.model.rulebase import Semantics, summary
 from fuzzytree.model.rules import (
@@ -195,8 +196,10 @@ class FuzzySystem(Value, frozen=True):
     classes: ClassVar[tuple[str, ...]] = ()  # its answers are numbers
     rule_labels: ClassVar[tuple[str, ...]] = ()
     columns: ClassVar[tuple[str, ...]] = ()  # it is learnt from no table
-    nodes: ClassVar[tuple[()]] = ()
-    sets: ClassVar[tuple[()]] = ()
+    kind: ClassVar[None] = None
+    nodes: ClassVar[tuple[Node, ...]] = ()
+    leaves: ClassVar[tuple[Leaf, ...]] = ()
+    sets: ClassVar[tuple[Sets, ...]] = ()
     semantics: ClassVar[Semantics] = Semantics()  # no class, whatever is missing
 
     def __post_init__(self) -> None:

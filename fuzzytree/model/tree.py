@@ -12,11 +12,15 @@ import importlib
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import msgspec
 
-from fuzzytree.model.probabilities import Probabilities, probability_mistakes
+from fuzzytree.model.nodes import Branch as Branch
+from fuzzytree.model.nodes import Leaf as Leaf
+from fuzzytree.model.nodes import Node as Node
+from fuzzytree.model.nodes import Sets as Sets
+from fuzzytree.model.probabilities import probability_mistakes
 from fuzzytree.model.rulebase import (
     Band,
     LabelType,
@@ -24,7 +28,6 @@ from fuzzytree.model.rulebase import (
     Path,
     Proposition,
     Semantics,
-    Term,
     Value,
     Variable,
     naming_mistakes,
@@ -36,70 +39,11 @@ from fuzzytree.model.rulebase import (
     variable_mistakes,
 )
 
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import Document
+
 Use = Literal["tree", "relative", "raw"]
 """What a tree serves: its own path, its relative rules, the paper's raw rules."""
-
-
-class Leaf(Value, frozen=True):
-    """Where a path ends.
-
-    Attributes:
-        label: The class.
-        pattern: The fuzzy pattern that it holds; the class itself, or one of several
-            shapes of the class, such as `hand #2`.
-        support: How many training rows reached it, if known; estimated from a sample
-            where learning kept one (`rows_per_class`).
-        probabilities: As those of its rule.
-    """
-
-    label: str
-    pattern: str = ""
-    support: int | None = None
-    probabilities: Probabilities = msgspec.UNSET
-
-
-class Branch(Value, frozen=True):
-    """One way on from a node: to the node or leaf of that number.
-
-    Attributes:
-        terms: The relative terms of the node's variable, joined by OR, one for each
-            interval that the branch owns, in their order: bands whose plateaus are
-            these intervals, so that the degree is 1 exactly where the branch is taken.
-        sets: The patterns whose fitted sets on that variable make up the raw degree
-            of the branch, joined by OR; empty in a tree that carries no sets.
-        node: The number of the next node, or None.
-        leaf: The number of the leaf, or None; exactly one of the two is given.
-    """
-
-    terms: tuple[str, ...]
-    sets: tuple[str, ...] = ()
-    node: int | None = None
-    leaf: int | None = None
-
-
-class Node(Value, frozen=True):
-    """A question about one variable.
-
-    Attributes:
-        variable: The variable it looks at.
-        cuts: b1 < b2 < ... < bk: where the decision changes.
-        owners: For each of the k + 1 intervals (b_i, b_i+1], the position of its
-            branch in `branches`; every branch owns at least one, and neighbours
-            belong to different branches.
-        branches: At least two.
-    """
-
-    variable: str
-    cuts: tuple[float, ...]
-    owners: tuple[int, ...]
-    branches: tuple[Branch, ...]
-
-
-class Sets(Value, frozen=True):
-    """The fitted sets (LR type) of the patterns on one variable, named by pattern."""
-
-    variable: str
-    terms: tuple[Term, ...]
 
 
 class FuzzyTree(Value, frozen=True):
@@ -132,6 +76,7 @@ class FuzzyTree(Value, frozen=True):
     outputs: ClassVar[tuple[()]] = ()  # its answers are classes
     rules: ClassVar[tuple[()]] = ()  # one path is followed
     blocks: ClassVar[tuple[()]] = ()
+    kind: ClassVar[None] = None
     note: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
@@ -194,7 +139,7 @@ def with_label_type(
     return msgspec.structs.replace(tree, semantics=semantics)
 
 
-def depth(tree: FuzzyTree) -> int:
+def depth(tree: Document) -> int:
     """Return how many nodes the longest path of a tree has."""
     # Nodes stand before those below them.
     depths = [1] * len(tree.nodes)

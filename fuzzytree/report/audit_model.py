@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.auditing import AuditAnswer, AuditView, Sampled
-from fuzzytree.model import FuzzySystem, FuzzyTree, RuleBase
+from fuzzytree.model import Document
 from fuzzytree.report.audit_rows import Data, Passing
 from fuzzytree.report.audit_states import percent
 from fuzzytree.report.drawing import Axis
@@ -17,13 +17,11 @@ from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import MOST_LEAVES, tree_picture
 from fuzzytree.report.text import counted, number
 
-Audited = FuzzyTree | RuleBase | FuzzySystem
-
 MOST_VARIABLES = 60
 _MOST_TERMS = 40  # of a variable that are described in words
 
 
-def tree_section(tree: FuzzyTree, passed: Passing | None) -> Markup:
+def tree_section(tree: Document, passed: Passing | None) -> Markup:
     """Return a tree as a picture and as an outline."""
     lines = [*itertools.islice(tree_lines(tree), MOST_LINES)]
     is_small = len(tree.leaves) <= MOST_LEAVES
@@ -31,7 +29,7 @@ def tree_section(tree: FuzzyTree, passed: Passing | None) -> Markup:
     return part("tree", tree, picture, _bars_mean(tree, passed), lines, MOST_LEAVES)
 
 
-def _bars_mean(tree: FuzzyTree, passed: Passing | None) -> str:
+def _bars_mean(tree: Document, passed: Passing | None) -> str:
     if passed is not None:
         said = "The bar in a box shows the rows that pass it, by their class"
         if passed.missing:
@@ -43,7 +41,7 @@ def _bars_mean(tree: FuzzyTree, passed: Passing | None) -> str:
 
 
 def terms_section(
-    model: Audited,
+    model: Document,
     axes: Mapping[str, Axis],
     data: Data | None,
 ) -> Markup:
@@ -73,7 +71,7 @@ def terms_section(
 
 
 def _cards(
-    axes: Sequence[Axis], model: Audited, data: Data | None, name: str
+    axes: Sequence[Axis], model: Document, data: Data | None, name: str
 ) -> Iterator[tuple[Axis, Markup, list[str]]]:
     """Yield variables with their pictures and their terms in words."""
     variables = {one.name: one for one in model.variables}

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from fuzzytree.auditing import Audit, AuditAnswer, AuditRows, view
-from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
+from fuzzytree.model import Agreement, Document
 from fuzzytree.report.audit import (
     SUMMARY,
     asked_text,
@@ -47,7 +47,7 @@ _Section = tuple[str, str, Markup]  # its anchor, its title, its content
 
 def page(
     audit: Audit,
-    model: FuzzyTree | RuleBase | FuzzySystem,
+    model: Document,
     *,
     rows: AuditRows | None = None,
     agreement: Agreement | None = None,
@@ -74,13 +74,13 @@ def page(
         True
     """
     audit = as_in_file(audit)
-    classes, missing = None, audit.policy.missing or "no class"
-    if not isinstance(model, FuzzySystem):
-        classes, missing = model.classes, missing_text(model)
+    missing = audit.policy.missing or "no class"
+    if model.classes:
+        missing = missing_text(model)
     sections = [*_sections(audit, model, rows, agreement, stability)]
     return whole_page(
         title=f"{audit.model}: audit",
-        head=part("head", audit, classes, missing),
+        head=part("head", audit, model.classes or None, missing),
         verdict=verdict(audit),
         sections=sections,
         body=[part("section", *section) for section in sections],
@@ -89,7 +89,7 @@ def page(
 
 def _sections(
     audit: Audit,
-    model: FuzzyTree | RuleBase | FuzzySystem,
+    model: Document,
     rows: AuditRows | None,
     agreement: Agreement | None,
     stability: Stability | None,
@@ -98,7 +98,7 @@ def _sections(
     data = data_of(model, rows) if rows is not None else None
     viewed = view(model, audit.domain)
     findings = gravest_first(audit.findings)
-    if isinstance(model, FuzzyTree):
+    if model.leaves:
         passed = passing(model, data) if data is not None else None
         yield "tree", "The tree", tree_section(model, passed)
     yield "terms", "Variables and terms", terms_section(model, axes, data)

@@ -8,11 +8,9 @@ import numpy as np
 
 from fuzzytree.auditing import AuditRows
 from fuzzytree.model import (
+    Document,
     FloatArray,
-    FuzzySystem,
-    FuzzyTree,
     IntArray,
-    RuleBase,
 )
 from fuzzytree.runtimes import axis_lines, plan_axes
 
@@ -44,7 +42,7 @@ class Passing(NamedTuple):
     missing: int
 
 
-def data_of(model: FuzzyTree | RuleBase | FuzzySystem, rows: AuditRows) -> Data:
+def data_of(model: Document, rows: AuditRows) -> Data:
     """Return the rows on every axis of a model."""
     classes = () if rows.codes is None else model.classes
     plan = plan_axes(model.variables)
@@ -57,7 +55,7 @@ def data_of(model: FuzzyTree | RuleBase | FuzzySystem, rows: AuditRows) -> Data:
     return Data(axes, codes, classes)
 
 
-def passing(tree: FuzzyTree, data: Data) -> Passing:
+def passing(tree: Document, data: Data) -> Passing:
     """Return how the rows go through a tree; those with a missing value are counted."""
     known = np.isfinite(np.array([*data.axes.values()])).all(axis=0)
     nodes: list[Counts] = []

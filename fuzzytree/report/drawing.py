@@ -12,13 +12,11 @@ from fuzzytree.auditing import Domain
 from fuzzytree.model import (
     LR,
     Band,
+    Document,
     Formula,
-    FuzzySystem,
-    FuzzyTree,
     Linear,
     Part,
     Points,
-    RuleBase,
     Shape,
     SystemOutput,
     Term,
@@ -89,9 +87,7 @@ class Axis(NamedTuple):
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
 
-def axes_of(
-    model: FuzzyTree | RuleBase | FuzzySystem, domain: Domain
-) -> dict[str, Axis]:
+def axes_of(model: Document, domain: Domain) -> dict[str, Axis]:
     """Return every input and combination of a model as it is drawn, by name."""
     variables = model.variables
     axes: dict[str, Axis] = {}

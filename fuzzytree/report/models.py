@@ -16,13 +16,12 @@ from fuzzytree.model import (
     Document,
     Formula,
     FuzzySystem,
-    FuzzyTree,
     Leaf,
     Linear,
     Node,
     Part,
     Points,
-    RuleBase,
+    Rule,
     RuleBlock,
     Semantics,
     Side,
@@ -43,6 +42,8 @@ from fuzzytree.report.text import aligned, counted, number
 from fuzzytree.runtimes import Facts, OnnxModel, Outputs
 from fuzzytree.semantics import Status, rules_of
 
+Rules = Sequence[Rule | SystemRule]
+
 _MOST_PAIRS = 6  # points that a line of text shows one by one
 _MOST_PARTS = 12  # of a combination, where it must fit into a line
 
@@ -50,37 +51,35 @@ _MOST_PARTS = 12  # of a combination, where it must fit into a line
 def model_lines(model: Document) -> Iterator[str]:
     """Yield a model as a person reads it: head, tree, rules, terms."""
     yield from head_lines(model)
-    start = 1
-    for block in model.blocks:
+    if model.leaves:
         yield ""
-        yield from _block_lines(block, start)
-        start += len(block.rules)
-    yield ""
-    if isinstance(model, FuzzySystem):
-        yield from term_lines(model.all_variables, model.inputs)
-        return
-    if isinstance(model, FuzzyTree):
         yield from tree_lines(model)
+    start = 1
+    blocks: list[tuple[str, Rules]]
+    blocks = [(_block_text(block), block.rules) for block in model.blocks]
+    for head, rules in blocks or [("", rules_of(model).rules)]:
         yield ""
-    rules = rules_of(model).rules
-    width = len(str(len(rules)))
-    for position, rule in enumerate(rules, 1):
-        rows = f"  {counted(rule.support, 'row')}" if rule.support is not None else ""
-        yield f"{position:{width}}. {sentence(rule)}{rows}"
+        if head:
+            yield head
+        width = len(str(start + len(rules) - 1))
+        for position, rule in enumerate(rules, start):
+            yield f"{position:{width}}. {rule_text(rule)}{_rows_text(rule)}"
+        start += len(rules)
     yield ""
-    yield from term_lines(model.variables)
+    yield from term_lines((*model.variables, *model.outputs), model.inputs)
 
 
 def rule_facts(model: Document) -> list[dict[str, object]]:
     """Return the rules for programs: number, sentence, and class and rows or weight."""
-    if isinstance(model, FuzzySystem):
-        return [
-            {"number": k, "text": rule_text(rule), "weight": rule.weight}
-            for k, rule in enumerate(model.rules, 1)
-        ]
+    rules: Rules = rules_of(model).rules
     return [
-        {"number": k, "text": sentence(r), "class": r.then, "rows": r.support}
-        for k, r in enumerate(rules_of(model).rules, 1)
+        {"number": number, "text": rule_text(rule)}
+        | (
+            {"class": rule.then, "rows": rule.support}
+            if isinstance(rule, Rule)
+            else {"weight": rule.weight}
+        )
+        for number, rule in enumerate(rules, 1)
     ]
 
 
@@ -93,7 +92,7 @@ def document_text(model: Document) -> str:
         'tree, 1 node, 2 leaves, depth 1, 1 input, 3 classes'
     """
     inputs = counted(len(model.inputs), "input")
-    if isinstance(model, FuzzySystem):
+    if model.outputs:
         outputs, rules = len(model.outputs), len(model.rules)
         return (
             f"fuzzy system, {inputs}, {counted(outputs, 'output')}, "
@@ -148,29 +147,29 @@ def fact_lines(facts: Mapping[str, object]) -> list[str]:
 
 def head_lines(model: Document) -> Iterator[str]:
     """Yield what a model is, what it needs, and what it answers."""
-    if isinstance(model, FuzzySystem):
-        yield f"{model.name}: {document_text(model)}"
-        yield from (f"note     {line}" for line in model.note.splitlines())
-        yield f"inputs   {len(model.inputs)}: {', '.join(model.inputs) or 'none'}"
-        names = ", ".join(one.name for one in model.outputs)
-        yield f"outputs  {len(model.outputs)}: {names}"
-        yield "answers  missing value: nan"
-        return
-    fuzzy = "" if model.rules else "fuzzy "
-    yield f"{model.name}: {fuzzy}{kind_text(model)}"
+    fuzzy = "fuzzy " if model.leaves else ""
+    what = document_text(model) if model.outputs else fuzzy + kind_text(model)
+    yield f"{model.name}: {what}"
+    yield from (f"note     {line}" for line in model.note.splitlines())
     of = f" of {len(model.columns)} columns" if model.columns else ""
     yield f"inputs   {len(model.inputs)}{of}: {', '.join(model.inputs) or 'none'}"
-    yield f"classes  {len(model.classes)}: {', '.join(model.classes)}"
-    semantics = model.semantics
+    results = [output.name for output in model.outputs] or model.classes
+    yield (
+        f"{'outputs' if model.outputs else 'classes'}  "
+        f"{len(results)}: {', '.join(results)}"
+    )
     answers = f"missing value: {missing_text(model)}"
-    if model.rules:
+    semantics = model.semantics
+    if model.rules and not model.outputs:
         answers += f"; no rule fires: {semantics.uncovered or 'no class'}"
         answers += f"; AND is {semantics.conjunction}; the first of the strongest wins"
     yield f"answers  {answers}"
 
 
-def missing_text(model: FuzzyTree | RuleBase) -> str:
+def missing_text(model: Document) -> str:
     """Return what becomes of a missing value."""
+    if model.outputs:
+        return "nan"
     answer, filled = model.semantics.missing or "no class", stand_ins(model.variables)
     if not filled:
         return answer
@@ -179,23 +178,24 @@ def missing_text(model: FuzzyTree | RuleBase) -> str:
     return f"replaced, see `missing as` of {counted(len(filled), 'input')}{more}"
 
 
-def kind_text(model: FuzzyTree | RuleBase) -> str:
-    """Return what a model is and how large."""
-    if isinstance(model, FuzzyTree):
+def kind_text(model: Document) -> str:
+    """Return what a model is that decides for a class, and how large."""
+    if model.leaves:
         sizes = f"{counted(len(model.leaves), 'leaf', 'leaves')}, depth {depth(model)}"
         return f"tree, {counted(len(model.nodes), 'node')}, {sizes}"
     kind = f"{model.kind} " if model.kind else ""
     return f"{kind}rule base, {counted(len(model.rules), 'rule')}"
 
 
-def tree_lines(tree: FuzzyTree) -> Iterator[str]:
+def tree_lines(tree: Document) -> Iterator[str]:
     """Yield a tree drawn with its branches, each with the values that it takes."""
-    if not tree.nodes:
-        yield _leaf_text(1, tree.leaves[0])
+    nodes, leaves = tree.nodes, tree.leaves
+    if not nodes:
+        yield _leaf_text(1, leaves[0])
         return
     parts = {v.name: len(v.parts) for v in tree.variables}
-    yield _node_text(tree.nodes[0], parts)
-    todo = _branches(tree.nodes[0], "")
+    yield _node_text(nodes[0], parts)
+    todo = _branches(nodes[0], "")
     while todo:
         node, position, indent = todo.pop()
         branch = node.branches[position]
@@ -203,12 +203,12 @@ def tree_lines(tree: FuzzyTree) -> Iterator[str]:
         corner, rail = ("└─ ", "   ") if is_last else ("├─ ", "│  ")
         text = f"{' or '.join(branch.terms)} ({taken(node, position)})"
         if branch.node is not None:
-            below = tree.nodes[branch.node - 1]
+            below = nodes[branch.node - 1]
             end = _node_text(below, parts)
             todo += _branches(below, indent + rail)
         else:
             leaf = branch.leaf or 1
-            end = _leaf_text(leaf, tree.leaves[leaf - 1])
+            end = _leaf_text(leaf, leaves[leaf - 1])
         yield f"{indent}{corner}{text}: {end}"
 
 
@@ -223,8 +223,13 @@ def _node_text(node: Node, parts: dict[str, int]) -> str:
 
 def _leaf_text(position: int, leaf: Leaf) -> str:
     shape = f" ({leaf.pattern})" if leaf.pattern not in ("", leaf.label) else ""
-    rows = f"  {counted(leaf.support, 'row')}" if leaf.support is not None else ""
-    return f"{leaf.label}{shape}  [{position}]{rows}"
+    return f"{leaf.label}{shape}  [{position}]{_rows_text(leaf)}"
+
+
+def _rows_text(part: Leaf | Rule | SystemRule) -> str:
+    """Return how many training rows reached a part, where that is known."""
+    support = None if isinstance(part, SystemRule) else part.support
+    return "" if support is None else f"  {counted(support, 'row')}"
 
 
 def taken(node: Node, position: int, most: str = "<=") -> str:
@@ -318,7 +323,7 @@ def _reason(texts: Sequence[str], degrees: Sequence[float], status: int) -> str:
     return "; ".join(fired) or "no rule fires"
 
 
-def _block_lines(block: RuleBlock, start: int) -> Iterator[str]:
+def _block_text(block: RuleBlock) -> str:
     name = f" {block.name}" if block.name else ""
     facts = [
         f"AND is {block.conjunction}" if block.conjunction else "",
@@ -326,10 +331,7 @@ def _block_lines(block: RuleBlock, start: int) -> Iterator[str]:
         f"THEN is {block.implication}" if block.implication else "",
         _activation_text(block.activation),
     ]
-    yield f"rules{name}: {'; '.join(filter(None, facts))}"
-    width = len(str(start + len(block.rules) - 1))
-    for position, rule in enumerate(block.rules, start):
-        yield f"{position:{width}}. {rule_text(rule)}"
+    return f"rules{name}: {'; '.join(filter(None, facts))}"
 
 
 def _activation_text(how: Activation) -> str:
@@ -347,8 +349,8 @@ def _activation_text(how: Activation) -> str:
             return f"the {counted(how.count, 'rule')} of {how.method} degree"
 
 
-def rule_text(rule: SystemRule) -> str:
-    """Return a rule of a fuzzy system as people read it.
+def rule_text(rule: Rule | SystemRule) -> str:
+    """Return a rule as people read it.
 
     Example:
         >>> from fuzzytree.model import Conclusion, Not, Proposition
@@ -356,6 +358,8 @@ def rule_text(rule: SystemRule) -> str:
         >>> rule_text(SystemRule(Not(hot), (Conclusion("power", "low"),), weight=0.5))
         'IF not (water is very hot) THEN power is low  (weight 0.5)'
     """
+    if isinstance(rule, Rule):
+        return sentence(rule)
     ends = conclusions_text(rule.then)
     weight = "" if rule.weight == 1.0 else f"  (weight {number(rule.weight)})"
     name = f"  ({rule.name})" if rule.name else ""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fuzzytree.auditing import Audit
-from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
+from fuzzytree.model import Agreement, Document
 from fuzzytree.report.audit import audit_lines
 from fuzzytree.report.markup import Markup
 from fuzzytree.report.models import head_lines, model_lines, term_lines
 from fuzzytree.report.parts import part
 
 
-def model_html(model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
+def model_html(model: Document) -> Markup:
     """Return a model: rules as a table, a tree or a system as `show` prints it.
 
     Example:
@@ -20,7 +20,7 @@ def model_html(model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
         >>> model_html(random_tree(1)).startswith("<pre>")
         True
     """
-    if not isinstance(model, RuleBase):
+    if model.leaves or model.outputs:
         return _lines(model_lines(model))
     terms = _lines(term_lines(model.variables))
     return part("rule_base", _lines(head_lines(model)), model, terms)

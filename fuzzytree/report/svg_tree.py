@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from fuzzytree.model import FuzzyTree, Node
+from fuzzytree.model import Document, Node
 from fuzzytree.report.audit_rows import Counts, Passing
 from fuzzytree.report.drawing import LETTER, cut
 from fuzzytree.report.markup import Markup, mark
@@ -58,7 +58,7 @@ class Box(msgspec.Struct):
         return _EDGE + self.level * (_WIDE + _ACROSS)
 
 
-def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
+def tree_picture(tree: Document, rows: Passing | None) -> Markup:
     """Return a tree from left to right.
 
     With rows, a box holds a bar: the rows that pass, by their class. A branch is the
@@ -72,7 +72,7 @@ def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
     return mark("svg", wide, high, "tree", f"The tree {_size_text(tree)}", desc, drawn)
 
 
-def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> Picture:
+def draw_tree(tree: Document, *, title: str | None = None) -> Picture:
     """Draw a tree: the variable of each node, the terms of its branches, the classes.
 
     A node shows its variable and its cuts. A leaf shows its class, and how many
@@ -117,7 +117,7 @@ def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> Picture:
     return picture(marks, wide, high + _LINE * (len(notes) + 1), said, _STYLE + colours)
 
 
-def _size_text(tree: FuzzyTree) -> str:
+def _size_text(tree: Document) -> str:
     nodes = counted(len(tree.nodes), "node")
     return f"{tree.name}: {nodes}, {counted(len(tree.leaves), 'leaf', 'leaves')}"
 
@@ -136,7 +136,7 @@ def class_mark(code: int) -> str:
     return f"k{code % len(_PALETTE)}"
 
 
-def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
+def boxes_of(tree: Document, rows: Passing | None) -> list[Box]:
     """Return all nodes and leaves, depth first; `placed` puts them in their places."""
     codes = {label: code for code, label in enumerate(tree.classes)}
     boxes: list[Box] = []
