@@ -315,13 +315,10 @@ def rated(model: Rated, seed: int) -> Rated:
         steps = itertools.pairwise([0, *marks, PARTS])
         vectors.append(tuple((high - low) / PARTS for low, high in steps))
     semantics = replace(model.semantics, sharpness=chance.choice(SHARPNESS))
-    if isinstance(model, FuzzyTree):
-        leaves = zip(model.leaves, vectors, strict=True)
-        new_leaves = tuple(replace(one, probabilities=v) for one, v in leaves)
-        return replace(model, leaves=new_leaves, semantics=semantics)
-    rules = zip(model.rules, vectors, strict=True)
-    new_rules = tuple(replace(one, probabilities=v) for one, v in rules)
-    return replace(model, rules=new_rules, semantics=semantics)
+    ends = zip(model.leaves or model.rules, vectors, strict=True)
+    parts = tuple(replace(end, probabilities=vector) for end, vector in ends)
+    place = str(model.rule_path(1)[0])
+    return replace(model, semantics=semantics, **{place: parts})
 
 
 def with_points(rules: RuleBase, seed: int, *, share: float = 0.6) -> RuleBase:

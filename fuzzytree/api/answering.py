@@ -256,7 +256,7 @@ def _rated(model: Document | OnnxModel) -> Document | OnnxModel:
         if "probabilities" not in outputs:
             raise ValueError(f"{model.name}: the file has no output 'probabilities'")
         return model
-    if isinstance(model, FuzzySystem) or not model.semantics.sharpness:
+    if not model.semantics.sharpness:
         raise ValueError(f"{model.name} has no probabilities of classes")
     return rules_of(model)
 

@@ -38,7 +38,6 @@ from fuzzytree.model import (
     Document,
     Format,
     Reading,
-    RuleBase,
     Written,
 )
 
@@ -188,10 +187,9 @@ def carry(
         write_atomically(chosen.output, written.content)
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
-    rules = model if isinstance(model, RuleBase) else None
-    is_raw = rules is not None and rules.kind == "raw"
-    more = ("--terms", "raw") if is_raw and model is not found.model else ()
-    if rules and form.read and "tolerance" in options:
+    is_raw = model.kind == "raw" and model is not found.model
+    more = ("--terms", "raw") if is_raw else ()
+    if model.rules and model.classes and form.read and "tolerance" in options:
         more = (*more, "--tolerance", str(options["tolerance"]))
     after = next_check((source, read_as), (chosen.output, form.name), more=more)
     if after and found.losses:

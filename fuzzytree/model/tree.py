@@ -27,6 +27,7 @@ from fuzzytree.model.rulebase import (
     Mistake,
     Path,
     Proposition,
+    Rule,
     Semantics,
     Value,
     Variable,
@@ -74,7 +75,7 @@ class FuzzyTree(Value, frozen=True):
     columns: tuple[str, ...] = ()
 
     outputs: ClassVar[tuple[()]] = ()  # its answers are classes
-    rules: ClassVar[tuple[()]] = ()  # one path is followed
+    rules: ClassVar[tuple[Rule, ...]] = ()  # one path is followed
     blocks: ClassVar[tuple[()]] = ()
     kind: ClassVar[None] = None
     note: ClassVar[str] = ""

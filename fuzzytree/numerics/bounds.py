@@ -27,11 +27,9 @@ from fuzzytree.model import (
     BoolArray,
     Dtype,
     FloatArray,
-    FuzzyTree,
     Model,
     ModelKind,
     Proposition,
-    RuleBase,
     Variable,
 )
 from fuzzytree.numerics.enclosures import axis_value, filled_values
@@ -66,7 +64,7 @@ _BLOCK = 1 << 13  # rows that are bounded together
 
 
 def strength_bounds(
-    rules: RuleBase, dtype: Dtype, values: FloatArray
+    rules: Model, dtype: Dtype, values: FloatArray
 ) -> tuple[FloatArray, str]:
     """Return the largest difference of any strength from the exact one, for each row.
 
@@ -94,7 +92,7 @@ def strength_bounds(
     return found, _origin(rules, dtype)
 
 
-def _origin(rules: RuleBase, dtype: Dtype) -> str:
+def _origin(rules: Model, dtype: Dtype) -> str:
     if rules.semantics.conjunction == "product":
         return f"largest sum of derived errors of a rule's degrees in {dtype}"
     return f"largest derived error of a degree in {dtype}"
@@ -103,7 +101,7 @@ def _origin(rules: RuleBase, dtype: Dtype) -> str:
 Key = tuple[str, str]
 
 
-def _term_bounds(rules: RuleBase, dtype: Dtype) -> dict[Key, DegreeBound]:
+def _term_bounds(rules: Model, dtype: Dtype) -> dict[Key, DegreeBound]:
     """Return the bound of each term that a rule names."""
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
     propositions = (proposition for rule in rules.rules for proposition in rule.when)
@@ -112,7 +110,7 @@ def _term_bounds(rules: RuleBase, dtype: Dtype) -> dict[Key, DegreeBound]:
 
 
 def _term_errors(
-    rules: RuleBase,
+    rules: Model,
     dtype: Dtype,
     bounds: Mapping[Key, DegreeBound],
     values: FloatArray,
@@ -132,7 +130,7 @@ def _term_errors(
     }
 
 
-def _joined(rules: RuleBase, dtype: Dtype, errors: Mapping[Key, Reals]) -> Reals:
+def _joined(rules: Model, dtype: Dtype, errors: Mapping[Key, Reals]) -> Reals:
     """Return the largest error of a strength from those of the terms' degrees."""
     unit = TYPES[dtype].degree
     propositions = dict.fromkeys(
@@ -283,14 +281,14 @@ def certify(
         >>> certify(rules, "mixed").sentence.partition(" unless ")[2]
         'the two strongest classes differ by 2.4e-07 or less'
     """
-    if isinstance(model, FuzzyTree):
+    if not model.rules:
         return _certify_tree(model, dtype, values)
     if values is None:
         return _certify_ranges(model, dtype)
     return _certify_rows(model, dtype, values)
 
 
-def _certify_rows(rules: RuleBase, dtype: Dtype, values: FloatArray) -> Certificate:
+def _certify_rows(rules: Model, dtype: Dtype, values: FloatArray) -> Certificate:
     values = filled_values(rules.variables, values)
     allowed, origin = strength_bounds(rules, dtype, values)
     is_bound = allowed < 1.0
@@ -320,7 +318,7 @@ def _certify_rows(rules: RuleBase, dtype: Dtype, values: FloatArray) -> Certific
     )
 
 
-def _certify_ranges(rules: RuleBase, dtype: Dtype) -> Certificate:
+def _certify_ranges(rules: Model, dtype: Dtype) -> Certificate:
     ranges = _declared(rules)
     variables = {v.name: v for v in rules.variables}
     terms: dict[Key, float] = {}
@@ -404,7 +402,7 @@ def _why(variable: Variable, term: str, bound: DegreeBound, dtype: Dtype) -> str
 
 
 def _term_texts(
-    rules: RuleBase, dtype: Dtype, errors: Mapping[Key, float]
+    rules: Model, dtype: Dtype, errors: Mapping[Key, float]
 ) -> tuple[TermBound, ...]:
     bounds = _term_bounds(rules, dtype)
     return tuple(
@@ -428,9 +426,7 @@ def _value_bounds(model: Model, dtype: Dtype, ranges: Ranges) -> tuple[ValueBoun
 # --- trees
 
 
-def _certify_tree(
-    tree: FuzzyTree, dtype: Dtype, values: FloatArray | None
-) -> Certificate:
+def _certify_tree(tree: Model, dtype: Dtype, values: FloatArray | None) -> Certificate:
     used = {node.variable for node in tree.nodes}
     if values is None:
         ranges, where, rows = _declared(tree), "for values in the declared ranges", None
@@ -471,7 +467,7 @@ def _certify_tree(
     )
 
 
-def open_paths(tree: FuzzyTree, dtype: Dtype, values: FloatArray) -> BoolArray:
+def open_paths(tree: Model, dtype: Dtype, values: FloatArray) -> BoolArray:
     """Return the rows in which rounding can change the path of a tree.
 
     There a value lies no farther from a cut than its rounding and the cut's, or it is

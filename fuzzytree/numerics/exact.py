@@ -29,11 +29,9 @@ import msgspec
 from fuzzytree.model import (
     LR,
     Band,
-    FuzzyTree,
     Model,
     Points,
     Proposition,
-    RuleBase,
     Shape,
     Side,
     Variable,
@@ -89,9 +87,7 @@ def exact_answer(model: Model, row: Mapping[str, float]) -> Exact:
     row = {n: x if math.isfinite(x) else stand.get(n, x) for n, x in row.items()}
     if any(is_missing(variable, row) for variable in model.variables):
         return Exact(0, model.semantics.missing, MISSING, (), _ONE)
-    if isinstance(model, RuleBase):
-        return _fired(model, row)
-    return _descended(model, row)
+    return _fired(model, row) if model.rules else _descended(model, row)
 
 
 def is_missing(variable: Variable, row: Mapping[str, float]) -> bool:
@@ -218,7 +214,7 @@ def _proposition_degree(
     return 1 - highest if proposition.negated else highest
 
 
-def _fired(rules: RuleBase, row: Mapping[str, float]) -> Exact:
+def _fired(rules: Model, row: Mapping[str, float]) -> Exact:
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
     propositions = dict.fromkeys(
         proposition for rule in rules.rules for proposition in rule.when
@@ -253,7 +249,7 @@ def _joined(degrees: Iterable[Fraction], *, is_product: bool) -> Fraction:
     return math.prod(degrees, start=_ONE) if is_product else min(degrees, default=_ONE)
 
 
-def _descended(tree: FuzzyTree, row: Mapping[str, float]) -> Exact:
+def _descended(tree: Model, row: Mapping[str, float]) -> Exact:
     variables = {v.name: v for v in tree.variables}
     node, leaf = (1, None) if tree.nodes else (None, 1)
     while node is not None:

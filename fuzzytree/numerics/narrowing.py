@@ -18,7 +18,6 @@ from fuzzytree.model import (
     Band,
     Document,
     Dtype,
-    FuzzyTree,
     Loss,
     Points,
     Shape,
@@ -59,11 +58,10 @@ def losses(model: Document, dtype: Dtype) -> tuple[Loss, ...]:
     if dtype != "float32":
         return ()
     found = [loss for v in model.variables for loss in _variable_losses(v, model)]
-    if isinstance(model, FuzzyTree):
-        for number, node in enumerate(model.nodes, 1):
-            where = f"node {number}"
-            found += _number_losses(where, [("cut", cut) for cut in node.cuts])
-            found += _order_losses(where, "cuts", node.cuts)
+    for number, node in enumerate(model.nodes, 1):
+        where = f"node {number}"
+        found += _number_losses(where, [("cut", cut) for cut in node.cuts])
+        found += _order_losses(where, "cuts", node.cuts)
     return tuple(found)
 
 

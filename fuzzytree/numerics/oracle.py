@@ -25,11 +25,9 @@ import numpy as np
 from fuzzytree.model import (
     BoolArray,
     FloatArray,
-    FuzzyTree,
     IntArray,
     Model,
     Proposition,
-    RuleBase,
 )
 from fuzzytree.numerics.enclosures import (
     EnclosedValue,
@@ -125,7 +123,7 @@ def decide(
         raise ValueError(f"values must have shape ({width}, rows), not {values.shape}")
     parts: list[Decisions] = []
     for part in _chunks(model, values.shape[1]):
-        if isinstance(model, RuleBase):
+        if model.rules:
             found = _decide_rules(model, values[:, part])
             if not with_strengths:
                 found = msgspec.structs.replace(found, strengths=None)
@@ -173,7 +171,7 @@ class _Enclosed(msgspec.Struct, frozen=True):
     rules: Enclosure
 
 
-def _decide_rules(rules: RuleBase, values: FloatArray) -> Decisions:
+def _decide_rules(rules: Model, values: FloatArray) -> Decisions:
     with np.errstate(all="ignore"):
         enclosed = _enclosed(rules, values)
         low, high = enclosed.rules
@@ -221,7 +219,7 @@ def _axes(
     return axes, missing
 
 
-def _enclosed(rules: RuleBase, values: FloatArray) -> _Enclosed:
+def _enclosed(rules: Model, values: FloatArray) -> _Enclosed:
     axes, missing = _axes(rules, values)
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
     propositions = dict.fromkeys(
@@ -241,7 +239,7 @@ def _enclosed(rules: RuleBase, values: FloatArray) -> _Enclosed:
 
 
 def _strengths(
-    rules: RuleBase, degrees: Mapping[Proposition, Enclosure], rows: int
+    rules: Model, degrees: Mapping[Proposition, Enclosure], rows: int
 ) -> Iterator[Enclosure]:
     """Yield the strength of each rule; what it shares with the last one is kept."""
     is_product = rules.semantics.conjunction == "product"
@@ -264,7 +262,7 @@ def _strengths(
 
 
 def _margins(
-    rules: RuleBase, low: FloatArray, high: FloatArray, rule: IntArray
+    rules: Model, low: FloatArray, high: FloatArray, rule: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return bounds of how far the winner's class is ahead of any other."""
     numbers = {label: number for number, label in enumerate(rules.classes)}
@@ -292,7 +290,7 @@ def _difference(a: FloatArray, b: FloatArray, towards: float) -> FloatArray:
 
 
 def _share_weakest(
-    rules: RuleBase, enclosed: _Enclosed, contends: BoolArray, is_open: BoolArray
+    rules: Model, enclosed: _Enclosed, contends: BoolArray, is_open: BoolArray
 ) -> BoolArray:
     """Return in which open rows all the strongest rules have one weakest term."""
     found = np.zeros_like(is_open)
@@ -374,7 +372,7 @@ def _labels(
 # --- trees
 
 
-def _decide_tree(tree: FuzzyTree, values: FloatArray) -> Decisions:
+def _decide_tree(tree: Model, values: FloatArray) -> Decisions:
     with np.errstate(all="ignore"):
         axes, missing = _axes(tree, values)
         rule, is_open = _followed(tree, axes, missing)
@@ -389,7 +387,7 @@ def _decide_tree(tree: FuzzyTree, values: FloatArray) -> Decisions:
 
 
 def _followed(
-    tree: FuzzyTree, axes: Mapping[str, EnclosedValue], missing: BoolArray
+    tree: Model, axes: Mapping[str, EnclosedValue], missing: BoolArray
 ) -> tuple[IntArray, BoolArray]:
     """Return each row's leaf by doubles, and where they may err on the way."""
     leaf = np.zeros(missing.shape, np.int64)
@@ -427,12 +425,12 @@ _MOST_DEGREES = 10_000  # that it computes so: a second or so; one row at least
 
 
 def strength_errors(
-    model: RuleBase, values: FloatArray, strengths: FloatArray
+    model: Model, values: FloatArray, strengths: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return how far given strengths are from the exact ones, in each row.
 
     Args:
-        model: The rule base.
+        model: A rule base.
         values: Shape (inputs, rows).
         strengths: Shape (rules, rows); NaN where a value is missing.
 
@@ -478,7 +476,7 @@ def strength_errors(
 
 
 def _errors(
-    model: RuleBase, values: FloatArray, strengths: FloatArray
+    model: Model, values: FloatArray, strengths: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     with np.errstate(all="ignore"):
         enclosed = _enclosed(model, values)

@@ -137,7 +137,7 @@ def probe_values(model: Document, limit: int, *, seed: int = 0) -> FloatArray:
     """Return the rows of `probes`, of a system `system_probes`, as (inputs, rows)."""
     import numpy as np
 
-    make = system_probes if isinstance(model, FuzzySystem) else probes
+    make = system_probes if model.outputs else probes
     rows = make(model, limit=limit, seed=seed)  # type: ignore[arg-type] # as chosen
     table = np.array([[row[n] for row in rows] for n in model.inputs], np.float64)
     return table.reshape(len(model.inputs), len(rows))

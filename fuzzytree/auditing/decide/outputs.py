@@ -30,7 +30,6 @@ from fuzzytree.model import (
     Conclusion,
     Document,
     FloatArray,
-    FuzzySystem,
     Linear,
     RuleBlock,
     Singleton,
@@ -84,7 +83,7 @@ class OutputBounds:
     """
 
     def __init__(
-        self, base: Base, system: FuzzySystem, name: str, *, model: int = 0
+        self, base: Base, system: Document, name: str, *, model: int = 0
     ) -> None:
         self.base, self.system = base, system
         self.output = next(output for output in system.outputs if output.name == name)

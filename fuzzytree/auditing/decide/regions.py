@@ -23,7 +23,7 @@ from fuzzytree.auditing.decide.domain import (
     variable_value,
 )
 from fuzzytree.auditing.decide.linear import Row, feasible, row_of
-from fuzzytree.model import Branch, FuzzyTree, Value, Variable, intervals
+from fuzzytree.model import Branch, Document, Value, Variable, intervals
 from fuzzytree.numerics import outwards
 
 Interval = tuple[float | None, float | None]
@@ -45,7 +45,7 @@ class Region(Value, frozen=True):
     sides: tuple[tuple[str, Union], ...]
 
 
-def regions(tree: FuzzyTree) -> tuple[Region, ...]:
+def regions(tree: Document) -> tuple[Region, ...]:
     """Return the region of each leaf, in the order of the leaves."""
     start = Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
     todo: list[tuple[Branch, dict[str, Union]]] = [(start, {})]
@@ -100,7 +100,7 @@ def box_count(region: Region) -> int:
     return math.prod(len(union) for _, union in region.sides)
 
 
-def boxes(region: Region, tree: FuzzyTree, domain: Domain) -> Iterator[Domain]:
+def boxes(region: Region, tree: Document, domain: Domain) -> Iterator[Domain]:
     """Yield the boxes of a region within a domain; those that are empty are left out.
 
     A box has a side for each side of the domain and for each combination on the path.
@@ -165,7 +165,7 @@ def _is_in(value: float, interval: Interval) -> bool:
     return (below is None or value > below) and (above is None or value <= above)
 
 
-def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:
+def point_in(box: Domain, tree: Document) -> dict[str, Fraction] | None:
     """Return a point of the inputs in a box, deep inside it; None if there is none.
 
     Its coordinates have few digits.
@@ -192,7 +192,7 @@ def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:
     return snap(box, tree.variables, point)
 
 
-def leaf_at(tree: FuzzyTree, point: Mapping[str, Fraction]) -> int:
+def leaf_at(tree: Document, point: Mapping[str, Fraction]) -> int:
     """Return the number of the leaf that a point of the inputs reaches, exactly."""
     variables = {variable.name: variable for variable in tree.variables}
     number = 1 if tree.nodes else None

@@ -160,9 +160,7 @@ class _Decisions(Differences):
 
     def __init__(self, pair: Pair[RuleBase]) -> None:
         self.pair = pair
-        self.both = Agreement(
-            pair.old, pair.new, pair.domain, are_trees=pair.trees is not None
-        )
+        self.both = Agreement(pair.old, pair.new, pair.domain, are_trees=pair.are_trees)
         super().__init__(self.both.base.count)
         self.witnesses: dict[
             tuple[str | None, ...], tuple[float, str, dict[str, Fraction]]

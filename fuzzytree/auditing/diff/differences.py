@@ -28,7 +28,6 @@ from fuzzytree.exporters import find_format
 from fuzzytree.model import (
     Document,
     FuzzySystem,
-    FuzzyTree,
     RuleBase,
     fingerprint,
     kind_of,
@@ -36,7 +35,7 @@ from fuzzytree.model import (
     version,
 )
 from fuzzytree.rechecking import Report, recheck_difference
-from fuzzytree.semantics import as_rules, rules_from_tree
+from fuzzytree.semantics import as_rules, rules_of
 
 
 def check_common_inputs(old: Document, new: Document, names: tuple[str, str]) -> None:
@@ -129,10 +128,8 @@ def difference(
     report("comparing decisions", 0.1)
     match both:
         case RuleBase() as first, RuleBase() as second:
-            trees = None
-            if isinstance(old, FuzzyTree) and isinstance(new, FuzzyTree):
-                trees = old, new
-            rules = Pair(first, second, inputs, domain, trees)
+            are_trees = bool(old.leaves and new.leaves)
+            rules = Pair(first, second, inputs, domain, are_trees)
             answers, evidence = class_answers(rules, rows, settings, budget, report)
         case FuzzySystem() as first, FuzzySystem() as second:
             systems = Pair(first, second, inputs, domain)
@@ -173,13 +170,8 @@ def difference(
 
 def _as_rules(model: Document) -> RuleBase | FuzzySystem:
     """Return a model as rules; a system whose outputs are numbers as it is."""
-    match model:
-        case FuzzyTree():
-            return rules_from_tree(model)
-        case FuzzySystem():
-            return as_rules(model, None) or model
-        case RuleBase():
-            return model
+    rules = rules_of(model)
+    return rules if isinstance(rules, RuleBase) else as_rules(rules) or rules
 
 
 def _confirm(result: Difference, models: tuple[Document, Document]) -> Difference:

@@ -9,7 +9,7 @@ propositions in common.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple, TypeVar
 
@@ -21,8 +21,10 @@ from fuzzytree.model import (
     FuzzySystem,
     Path,
     Proposition,
+    Rule,
     RuleBase,
     RuleBlock,
+    SystemRule,
     questions,
     sentence,
 )
@@ -140,32 +142,27 @@ def rules_to_match(
     def terms(parts: Iterable[Proposition]) -> set[tuple[str, str]]:
         return {(part.variable, term) for part in parts for term in part.terms}
 
-    if isinstance(model, RuleBase):
-        block = RuleBlock(())
-        return [
-            MatchRule(
-                ("rules", place),
-                sentence(rule),
-                tuple(operand(part, block) for part in rule.when),
-                rule.then,
-                names.get(rule.then, rule.then),
-                terms(rule.when),
-            )
-            for place, rule in enumerate(model.rules)
-        ]
+    blocks: list[tuple[int | None, RuleBlock, Sequence[Rule | SystemRule]]]
+    blocks = [(k, block, block.rules) for k, block in enumerate(model.blocks)]
     rules: list[MatchRule] = []
-    for number, block in enumerate(model.blocks):
-        for place, rule in enumerate(block.rules):
-            parts = rule.when.parts if isinstance(rule.when, And) else (rule.when,)
-            then = conclusions_text(rule.then)
-            when = " and ".join(condition_texts(rule.when))
-            text = f"IF {when} THEN {then}" if when else f"ALWAYS {then}"
-            concluded = {(part.output, part.term) for part in rule.then}
-            operands = tuple(operand(part, block) for part in parts if part)
-            users = terms(questions(rule.when)) | concluded
-            path: Path = ("blocks", number, "rules", place)
+    for number, block, members in blocks or [(None, RuleBlock(()), model.rules)]:
+        for rule in members:
+            path = model.rule_path(len(rules) + 1)
+            if isinstance(rule, Rule):
+                label, then, weight = rule.then, names.get(rule.then, rule.then), 1.0
+                text, users = sentence(rule), terms(rule.when)
+                operands = [operand(part, block) for part in rule.when]
+            else:
+                label = then = conclusions_text(rule.then)
+                weight, when = rule.weight, " and ".join(condition_texts(rule.when))
+                text = f"IF {when} THEN {then}" if when else f"ALWAYS {then}"
+                parts = rule.when.parts if isinstance(rule.when, And) else (rule.when,)
+                operands = [operand(part, block) for part in parts if part]
+                users = terms(questions(rule.when))
+                users |= {(part.output, part.term) for part in rule.then}
+            every = tuple(operands)
             rules.append(
-                MatchRule(path, text, operands, then, then, users, rule.weight, number)
+                MatchRule(path, text, every, label, then, users, weight, number)
             )
     return rules
 

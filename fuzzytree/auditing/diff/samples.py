@@ -19,7 +19,6 @@ from fuzzytree.model import (
     Document,
     FloatArray,
     FuzzySystem,
-    FuzzyTree,
     Rule,
     RuleBase,
     Variable,
@@ -73,14 +72,14 @@ class Pair(msgspec.Struct, Generic[Model], frozen=True, eq=False):
     Attributes:
         inputs: The inputs of either, the old ones first.
         domain: A side for each.
-        trees: The trees that the rules come from, if both are trees.
+        are_trees: Whether both come from trees.
     """
 
     old: Model
     new: Model
     inputs: tuple[str, ...]
     domain: Domain
-    trees: tuple[FuzzyTree, FuzzyTree] | None = None
+    are_trees: bool = False
 
     def rows_of(self, model: Model, values: FloatArray) -> FloatArray:
         """Return the columns of one model, of values of shape (inputs, rows)."""

@@ -48,6 +48,7 @@ Shown = Literal["always", "never", "rules", "ties", "uncovered", "any"]
 that a rule concerned makes, or a tie, or that no rule makes; always, or never."""
 
 _Names = Mapping[str, str]
+AnyRules = RuleBase | FuzzySystem
 
 
 class _Spot(NamedTuple):
@@ -66,8 +67,8 @@ class Structure:
 
     def __init__(
         self,
-        old: RuleBase | FuzzySystem,
-        new: RuleBase | FuzzySystem,
+        old: AnyRules,
+        new: AnyRules,
         domain: Domain,
         evidence: Evidence,
         models: tuple[Document, Document],
@@ -140,23 +141,17 @@ class Structure:
             here = _Spot(path)
             self._report(part, f"{what} {now}, and was {was}", shown, here, here)
 
-    def _compare(
-        self, old: RuleBase | FuzzySystem, new: RuleBase | FuzzySystem
-    ) -> None:
+    def _compare(self, old: AnyRules, new: AnyRules) -> None:
         names = self._compare_classes(old, new)
         matching = self._compare_rules(old, new, names)
         self._compare_variables("variables", old.variables, new.variables)
         self._compare_variables("outputs", old.outputs, new.outputs)
-        match old, new:
-            case RuleBase(), RuleBase():
-                self._compare_semantics(old.semantics, new.semantics, names)
-                self._compare_probabilities(old, new, matching)
-            case FuzzySystem(), FuzzySystem():
-                self._compare_blocks(old, new)
-                if old.note != new.note:
-                    self._report_name("the note has changed", _Spot(("note",)))
-            case _:  # a model of another kind was refused before
-                pass
+        self._compare_semantics(old.semantics, new.semantics, names)
+        if not self.is_system:
+            self._compare_probabilities(old, new, matching)
+        self._compare_blocks(old, new)
+        if old.note != new.note:
+            self._report_name("the note has changed", _Spot(("note",)))
         if len({kind_of(model) for model in self.models}) == 1:
             self._compare_sets(*self.models)
         if old.name != new.name:
@@ -172,12 +167,10 @@ class Structure:
 
     # --- class rules
 
-    def _compare_classes(
-        self, old: RuleBase | FuzzySystem, new: RuleBase | FuzzySystem
-    ) -> dict[str, str]:
+    def _compare_classes(self, old: AnyRules, new: AnyRules) -> dict[str, str]:
         """Return new names of classes: those with equal antecedents are the same."""
 
-        def labels(model: RuleBase | FuzzySystem) -> list[tuple[str, Hashable]]:
+        def labels(model: AnyRules) -> list[tuple[str, Hashable]]:
             rules = rules_to_match(model, self.curves)
             return [
                 (label, frozenset(r.antecedent for r in rules if r.then == label))
@@ -226,7 +219,7 @@ class Structure:
         report("answer", "the AND of rules is", *norms, "any", root, "conjunction")
 
     def _compare_probabilities(
-        self, old: RuleBase, new: RuleBase, pairs: Matching
+        self, old: AnyRules, new: AnyRules, pairs: Matching
     ) -> None:
         """Report other supports and probabilities, which decide no class."""
         was, now = old.semantics.sharpness, new.semantics.sharpness
@@ -274,7 +267,7 @@ class Structure:
 
     # --- systems
 
-    def _compare_blocks(self, old: FuzzySystem, new: FuzzySystem) -> None:
+    def _compare_blocks(self, old: AnyRules, new: AnyRules) -> None:
         for place, (was, now) in enumerate(zip_longest(old.blocks, new.blocks)):
             if was and now:
                 of = f" of block {place + 1}" if place else ""
@@ -301,9 +294,7 @@ class Structure:
 
     # --- rules
 
-    def _compare_rules(
-        self, old: RuleBase | FuzzySystem, new: RuleBase | FuzzySystem, names: _Names
-    ) -> Matching:
+    def _compare_rules(self, old: AnyRules, new: AnyRules, names: _Names) -> Matching:
         mine = rules_to_match(old, self.curves, names)
         theirs = rules_to_match(new, self.curves)
         matching, left = match_rules(mine, theirs)

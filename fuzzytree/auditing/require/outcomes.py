@@ -45,7 +45,7 @@ from fuzzytree.auditing.require.search import (
     Search,
     prediction_texts,
 )
-from fuzzytree.model import BoolArray, FloatArray, FuzzySystem, FuzzyTree, Linear
+from fuzzytree.model import BoolArray, FloatArray, Linear
 from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import Status
 
@@ -67,10 +67,10 @@ def outcome_of(claim: Claim, search: Search) -> Outcome:
                 return order_outcome(search, claim)
             case ConstancyClaim(columns=columns):
                 return constancy_outcome(search, columns)
-            case CoverageClaim() if isinstance(model, FuzzySystem):
-                return coverage_outcome(search, model)
-            case NumberClaim() if isinstance(model, FuzzySystem):
-                return number_outcome(search, model, claim)
+            case CoverageClaim() if model.outputs:
+                return coverage_outcome(search)
+            case NumberClaim() if model.outputs:
+                return number_outcome(search, claim)
             case _:
                 raise TypeError(f"{claim} is a claim about a fuzzy system")
     except NotBoundedError as error:
@@ -127,10 +127,9 @@ def order_outcome(search: Search, claim: OrderClaim) -> Outcome:
     rows = search.worst(loss, [claim.input])
     if rows is not None:
         return Outcome("REFUTED", "an earlier class follows", rows)
-    if tree := search.tree:
+    if model.leaves:
         return _of_leaves(
             search,
-            tree,
             [claim.input],
             lambda first, second: labels.index(first) > labels.index(second),
             rises=True,
@@ -153,8 +152,8 @@ def constancy_outcome(search: Search, columns: tuple[str, ...]) -> Outcome:
     pair = search.worst(loss, columns) if columns else None
     if pair is not None:
         return Outcome("REFUTED", "the rows differ in nothing else", pair)
-    if tree := search.tree:
-        return _of_leaves(search, tree, columns, str.__ne__, rises=False)
+    if model.leaves:
+        return _of_leaves(search, columns, str.__ne__, rises=False)
     rest: set[int] = set() if model.outputs else {*range(len(rules))}
     places = [model.inputs.index(name) for name in columns]
     for term in (term for output in model.outputs for term in output.terms):
@@ -181,7 +180,6 @@ _IsWrong = Callable[[str, str], bool]  # of the classes of two rows
 
 def _of_leaves(
     search: Search,
-    tree: FuzzyTree,
     changes: Collection[str],
     is_wrong: _IsWrong,
     *,
@@ -192,6 +190,7 @@ def _of_leaves(
     A leaf is a product of unions of intervals, so two rows with the same values of all
     other inputs can reach two leaves exactly if these share a value of each.
     """
+    tree = search.model
     tests = {node.variable for node in tree.nodes}
     for variable in tree.variables:
         sums = {part.input for part in variable.parts} & {*changes}
@@ -253,8 +252,9 @@ def _values(side: DomainSide, union: Union) -> list[float]:
 # --- outputs of fuzzy systems
 
 
-def coverage_outcome(search: Search, system: FuzzySystem) -> Outcome:
+def coverage_outcome(search: Search) -> Outcome:
     """Return whether every output of a system has a number that rules conclude."""
+    system = search.model
     run = baseline().load(system, with_strengths=False)
 
     def loss(rows: Rows) -> FloatArray:
@@ -271,11 +271,12 @@ def coverage_outcome(search: Search, system: FuzzySystem) -> Outcome:
     return search.rule_out(questions, "no rule fires", proof, loss)
 
 
-def number_outcome(search: Search, system: FuzzySystem, claim: NumberClaim) -> Outcome:
+def number_outcome(search: Search, claim: NumberClaim) -> Outcome:
     """Return whether an output has a number everywhere, and it or its slope is right.
 
     Both ends of a claim are moved outwards by what rounding may change.
     """
+    system = search.model
     place = [output.name for output in system.outputs].index(claim.output)
     line = search.model.inputs.index(claim.input) if claim.input else None
     allowed = ROUNDING * scale_of(system, claim.output)
@@ -293,7 +294,7 @@ def number_outcome(search: Search, system: FuzzySystem, claim: NumberClaim) -> O
     rows = search.worst(loss, [claim.input] if claim.input else ())
     outcome = Outcome("REFUTED", "", rows)
     if rows is None:
-        outcome = _proof(search, system, claim, loss)
+        outcome = _proof(search, claim, loss)
         rows = outcome.rows
     if rows is None:
         return outcome
@@ -306,10 +307,9 @@ def number_outcome(search: Search, system: FuzzySystem, claim: NumberClaim) -> O
     return outcome._replace(sentence=text)
 
 
-def _proof(
-    search: Search, system: FuzzySystem, claim: NumberClaim, loss: Loss
-) -> Outcome:
+def _proof(search: Search, claim: NumberClaim, loss: Loss) -> Outcome:
     """Return what bounds on boxes prove, or the row of a box that refutes it."""
+    system = search.model
     base, unit, of = search.base.fine, scale_of(system, claim.output), "it"
     if claim.input:
         axis = base.inputs[claim.input]

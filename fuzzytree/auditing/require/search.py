@@ -28,8 +28,6 @@ from fuzzytree.model import (
     DATE_UNIT,
     Document,
     FloatArray,
-    FuzzySystem,
-    FuzzyTree,
     Variable,
 )
 from fuzzytree.runtimes import baseline
@@ -59,7 +57,6 @@ class Search:
 
     def __init__(self, model: Document, domain: Domain, steps: int) -> None:
         self.model, self.domain, self.steps = model, domain, steps
-        self.tree = model if isinstance(model, FuzzyTree) else None
         self.base = Base.of(model, domain)
         self.run = predictor(model)
         self._decider = Decider(self.base)
@@ -177,7 +174,7 @@ def predictor(model: Document) -> Callable[[FloatArray], FloatArray]:
     position of the class, behind all of them for none.
     """
     run = baseline().load(model, with_strengths=False)
-    if isinstance(model, FuzzySystem):
+    if model.outputs:
         return lambda rows: cast("FloatArray", run(rows).outputs)
     places = [*model.classes, None]
     labels = [model.semantics.uncovered, *model.rule_labels]

@@ -94,7 +94,7 @@ def _numbered(letter: str, names: Iterable[str]) -> Names:
 
 
 def _renamed(part: Any, names: _NewNames) -> Any:
-    """Return a part of a tree or rules with new names, without what decides nothing."""
+    """Return a model or a part with new names, without what decides nothing."""
 
     def new(one: Any) -> Any:
         return _renamed(one, names)
@@ -107,6 +107,9 @@ def _renamed(part: Any, names: _NewNames) -> Any:
             keys = ("variables", "semantics", *_OWN[type(part)])
             parts = {key: new(getattr(part, key)) for key in keys}
             return type(part)(name="m", classes=classes, **parts)
+        case FuzzySystem():
+            blocks = tuple(_block(one, part, names) for one in part.blocks)
+            return FuzzySystem("m", new(part.variables), new(part.outputs), blocks)
         case Semantics(uncovered=uncovered, missing=missing):
             answers = names.classes[uncovered], names.classes[missing]
             return Semantics(part.conjunction, *answers)
@@ -184,9 +187,6 @@ def _renamed_system(part: Any, names: _NewNames) -> Any:
         return _renamed(one, names)
 
     match part:
-        case FuzzySystem():
-            blocks = tuple(_block(one, part, names) for one in part.blocks)
-            return FuzzySystem("m", new(part.variables), new(part.outputs), blocks)
         case SystemOutput(name=name, defuzzifier=how):
             is_free = how.is_weighted and not part.clips
             return replace(

@@ -87,7 +87,7 @@ def pointed(
     check_tolerance(tolerance)
     change: _Change = _Change(tolerance, keeps)
     result: D = replace(document, variables=change.variables(document.variables))
-    if isinstance(result, FuzzySystem):
+    if result.outputs:
         result = replace(result, outputs=change.variables(result.outputs))
     if change.reasons:
         head = f"cannot write the curves of {document.name} as points:"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.model import FuzzyTree, Model
+from fuzzytree.model import Model
 from fuzzytree.semantics import axis_values, landmarks
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.features.plain import plain_features
@@ -136,9 +136,12 @@ def _edge(
 
 def _cuts(model: Model) -> list[tuple[str, float]]:
     """Return where a model changes its mind: the name of a variable, and a value."""
-    if isinstance(model, FuzzyTree):
-        found = [(one.variable, cut) for one in model.nodes for cut in one.cuts]
-    else:
-        terms = [(one.name, term) for one in model.variables for term in one.terms]
-        found = [(n, value) for n, term in terms for value in landmarks(term.shape)]
-    return list(dict.fromkeys(found))
+    cuts = [(node.variable, cut) for node in model.nodes for cut in node.cuts]
+    if model.rules:
+        cuts = [
+            (variable.name, value)
+            for variable in model.variables
+            for term in variable.terms
+            for value in landmarks(term.shape)
+        ]
+    return list(dict.fromkeys(cuts))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from enum import IntEnum
 
 from fuzzytree.exporters import answer_of
-from fuzzytree.model import Model, RuleBase, Value
+from fuzzytree.model import Model, Value
 from fuzzytree.semantics import Status
 from fuzzytree.semantics import evaluate_program as run
 from fuzzytree.tactile.features import FrameProgram
@@ -93,7 +93,7 @@ def check_reject(model: Model, reject: float) -> None:
         raise ValueError(f"reject lies in 0 to 1, not {reject!r}")
     if not reject:
         return
-    if not isinstance(model, RuleBase):
+    if not model.rules:
         raise ValueError(
             f"{model.name}: a tree has no strengths to reject by; give its raw rules"
         )

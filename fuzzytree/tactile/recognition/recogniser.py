@@ -23,7 +23,7 @@ from fuzzytree.model import (
     Run,
 )
 from fuzzytree.runtimes import class_probabilities, load
-from fuzzytree.semantics import Status, rules_from_tree
+from fuzzytree.semantics import Status, rules_from_tree, rules_of
 from fuzzytree.tactile.features.names import feature_of, has_unit
 from fuzzytree.tactile.features.plain import State as State
 from fuzzytree.tactile.features.plain import check_reject
@@ -109,9 +109,7 @@ class Recogniser:
         self._uncovered = -1 if other is None else code[other]
         self._rated: RuleBase | None = None  # what mixes the model's probabilities
         if model.semantics.sharpness is not msgspec.UNSET:
-            self._rated = (
-                rules if isinstance(model, RuleBase) else rules_from_tree(model)
-            )
+            self._rated = rules_of(model)
             self._rate: Run = load(self._rated)
 
     def __call__(self, frames: Cells) -> Recognition:
@@ -189,13 +187,11 @@ def usual_floor(model: Model) -> float:
         return 0.0
     if model.semantics.floor is not msgspec.UNSET:
         return model.semantics.floor
-    if isinstance(model, FuzzyTree):
-        taught = dict.fromkeys(model.classes, 0.0)
-        for leaf in model.leaves:
-            taught[leaf.label] += FEW if leaf.support is None else leaf.support
-        if any(0 < count < FEW for count in taught.values()):
-            return 0.0
-    return USUAL_FLOOR
+    taught = dict.fromkeys(model.classes, 0.0)
+    for leaf in model.leaves:
+        taught[leaf.label] += FEW if leaf.support is None else leaf.support
+    has_few = any(0 < count < FEW for count in taught.values())
+    return 0.0 if has_few else USUAL_FLOOR
 
 
 def strength_rules(model: Model) -> RuleBase:
@@ -227,14 +223,14 @@ def check_inputs(model: Model, sensor: Sensor | None = None) -> None:
             raise TableError(f"{model.name}: {text}")
 
 
-def frames_model(path: PathLike) -> Model:
-    """Return the model of a file, which must be a tree or a rule base.
+def frames_model(source: Model | PathLike) -> Model:
+    """Return the model of a file, which must be a tree or a rule base, or a model.
 
     Raises:
         TableError: If it is something else; it begins with the path.
     """
-    model = opened(path)
+    model = opened(source)
     if not isinstance(model, FuzzyTree | RuleBase):
-        name = os.fspath(path)
+        name = os.fspath(source) if isinstance(source, PathLike) else model.name
         raise TableError(f"{name}: a model of frames is a tree or a rule base")
     return model

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from fuzzytree.model import FuzzyTree, RuleBase
 from fuzzytree.tactile.board_file import load_board
 from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.link import Connection, open_connection, room, start
@@ -150,8 +149,7 @@ def open(
         >>> frame.cells.shape, [thing.label for thing in frame.objects]
         ((4, 6), ['bar'])
     """
-    if not isinstance(model, FuzzyTree | RuleBase):
-        model = frames_model(model)
+    model = frames_model(model)
     is_recorded = record is not None
     with contextlib.ExitStack() as stack:
         line, used, remarks = _source(
