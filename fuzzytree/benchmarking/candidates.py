@@ -34,7 +34,6 @@ from fuzzytree.model import (
     FuzzySystem,
     Outcome,
     Prepared,
-    RuleBase,
     Runtime,
     kind_of,
 )
@@ -288,15 +287,15 @@ def variants(model: Document, bounds: Bounds, layouts: Layouts) -> Candidates:
     runtimes = [one for one in all_runtimes() if one.in_variants and is_installed(one)]
     for question, form in questions(model).items():
         makers: Mapping[str, Make] = {}
-        if isinstance(form, RuleBase):
+        if form.outputs:
+            makers = _fewer_samples(form)
+        elif form.rules:
             terms = sum(len(variable.terms) for variable in form.variables)
             if terms > _MOST_TERMS:
                 why = f"{terms:,} terms, and {_MOST_TERMS} are the most to approximate"
                 omitted.append(Omission(f"variants: {question}", why))
                 continue
             makers = _makers(form)
-        elif form.outputs:
-            makers = _fewer_samples(form)
         for what, make in makers.items():
             candidates += (
                 Candidate(
@@ -311,7 +310,7 @@ def variants(model: Document, bounds: Bounds, layouts: Layouts) -> Candidates:
     return candidates, omitted
 
 
-def _makers(rules: RuleBase) -> dict[str, Make]:
+def _makers(rules: Document) -> dict[str, Make]:
     """Return what makes each variant: points, and degrees below the largest there is.
 
     Without curves there is nothing to approximate.
@@ -328,7 +327,7 @@ def _makers(rules: RuleBase) -> dict[str, Make]:
 
 
 def _approximate(
-    change: Callable[..., ApproximateRules], rules: RuleBase, size: float
+    change: Callable[..., ApproximateRules], rules: Document, size: float
 ) -> tuple[Document, Bound | None]:
     changed = change(rules, size)
     return changed.model, (changed.bound, changed.origin)
@@ -354,7 +353,7 @@ def _with_samples(system: Document, count: int) -> tuple[Document, Bound | None]
     return replace(system, outputs=tuple(outputs)), None
 
 
-def _largest_degree(rules: RuleBase) -> int:
+def _largest_degree(rules: Document) -> int:
     shapes = [term.shape for variable in rules.variables for term in variable.terms]
     sets = [shape for shape in shapes if isinstance(shape, LR)]
     sides = [side for shape in sets for side in (shape.left, shape.right)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar, cast
 
 import msgspec
 import numpy as np
@@ -25,7 +25,7 @@ from fuzzytree.model import (
     FloatArray,
     FuzzySystem,
     IntArray,
-    RuleBase,
+    Model,
 )
 from fuzzytree.numerics import Decisions, decide, strength_errors
 from fuzzytree.runtimes import definition
@@ -195,9 +195,10 @@ def measured_error(
     flips = _flips(output, sample)
     count = int(flips.sum())
     error = Error(int(flips.size), largest, bound, origin, count, outputs=outputs)
-    model, truth = sample.model, sample.decisions
-    if truth is None or not isinstance(model, RuleBase):
+    truth = sample.decisions
+    if truth is None or truth.strengths is None:
         return error
+    model = cast("Model", sample.model)
     band = margin = None
     if output.strengths is not None:
         errors, _ = strength_errors(model, sample.values, output.strengths)
@@ -250,9 +251,7 @@ def _output_errors(
     return errors
 
 
-def _cover(
-    output: CandidateOutput, rules: RuleBase, truth: Decisions
-) -> tuple[int, int]:
+def _cover(output: CandidateOutput, rules: Model, truth: Decisions) -> tuple[int, int]:
     """Return how many rows lost and gained cover, as far as the answers show it."""
     strengths = output.strengths
     weighed = truth.status != Status.MISSING

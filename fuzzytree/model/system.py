@@ -46,6 +46,7 @@ from fuzzytree.model.rules import (
 )
 from fuzzytree.model.values import Value
 from fuzzytree.model.variables import (
+    Part,
     Term,
     Variable,
     input_mistakes,
@@ -169,6 +170,9 @@ class SystemOutput(Value, frozen=True):
     default: float | None = None
     clips: bool = False
     unit: str = ""
+
+    parts: ClassVar[tuple[Part, ...]] = ()  # it is no sum of inputs
+    categories: ClassVar[tuple[str, ...]] = ()
 
 
 class FuzzySystem(Value, frozen=True):

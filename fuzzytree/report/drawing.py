@@ -125,12 +125,9 @@ def axis_of(variable: Variable | SystemOutput) -> Axis:
     curves = tuple(_labelled(t) for t in variable.terms if not is_undrawn[t.name])
     others = tuple(name for name, is_left in is_undrawn.items() if is_left)
     ends = variable.low, variable.high
-    if isinstance(variable, SystemOutput):
-        return Axis(variable.name, variable.unit, curves, others, *ends)
     if variable.categories:
         ends = 0.0, len(variable.categories) - 1.0
-    parts = variable.parts
-    return Axis(variable.name, variable.unit, curves, others, *ends, parts)
+    return Axis(variable.name, variable.unit, curves, others, *ends, variable.parts)
 
 
 def curve_of(name: str, shape: Shape) -> Curve:

@@ -255,11 +255,10 @@ def term_lines(
     `columns` are the inputs of a fuzzy system, which linear terms multiply.
     """
     for one in variables:
-        parts = one.parts if isinstance(one, Variable) else ()
-        if not one.terms and not parts and isinstance(one, Variable):
+        if isinstance(one, Variable) and not (one.terms or one.parts):
             continue
         yield one.name + _span_text(one)
-        for position, line in enumerate(_summands(parts)):
+        for position, line in enumerate(_summands(one.parts)):
             lead = f"  {line}" if position else f"= {line.replace('+', ' ', 1)}"
             yield f"  {lead}"
         if isinstance(one, SystemOutput):

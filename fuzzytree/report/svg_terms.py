@@ -164,8 +164,7 @@ def draw_terms(model: Document) -> Picture:
 
 def _note_texts(variable: Variable | SystemOutput, axis: Axis) -> Iterator[str]:
     """Yield what a picture of terms does not show, in lines of their own."""
-    categories = () if isinstance(variable, SystemOutput) else variable.categories
-    words = [f"{place} is {name}" for place, name in enumerate(categories)]
+    words = [f"{place} is {name}" for place, name in enumerate(variable.categories)]
     texts = [", ".join(words)] if words else []
     texts += [f"{axis.name} = {sum_text(axis.parts)}"] if axis.parts else []
     if axis.undrawn:

@@ -125,37 +125,6 @@ def _mixed_tree() -> FuzzyTree:
     )
 
 
-def everyday_tree() -> FuzzyTree:
-    """Return a tree of a column of text, and of one whose missing values have a place.
-
-    Example:
-        >>> everyday_tree().variables[0].categories
-        ('Biscoe', 'Dream', 'Torgersen')
-    """
-    west = Term("Biscoe or Dream", Band(high=1.5, right=2.0))
-    east = Term("Torgersen", Band(low=1.5, left=1.0))
-    short = Term("low", Band(high=2.0, right=4.0))
-    long = Term("high", Band(low=2.0, left=0.0))
-    first = (Branch((west.name,), node=2), Branch((east.name,), leaf=3))
-    second = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
-    names = ("Biscoe", "Dream", "Torgersen")
-    return FuzzyTree(
-        "penguins",
-        ("Adelie", "Gentoo"),
-        (
-            Variable(
-                "island", (west, east), "", 0.0, 2.0, categories=names, missing=1.0
-            ),
-            Variable("bill", (short, long), "mm", 0.0, 5.0, missing=-1.0),
-        ),
-        (
-            Node("island", (1.5,), (0, 1), first),
-            Node("bill", (2.0,), (0, 1), second),
-        ),
-        (Leaf("Adelie"), Leaf("Gentoo"), Leaf("Adelie")),
-    )
-
-
 def _rules(*rules: Rule, semantics: Semantics | None = None) -> RuleBase:
     """Return a rule base over two inputs whose terms are ramps."""
     low, high = Points((0.0, 4.0), (1.0, 0.0)), Points((0.0, 4.0), (0.0, 1.0))

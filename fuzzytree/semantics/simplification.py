@@ -149,7 +149,7 @@ def _check_uses(model: Document, uses: Collection[Use]) -> None:
         raise ValueError(f"uses: there is {', '.join(USES)}, not {named}")
     if model.rules or model.sets or "raw" not in uses:
         return
-    if cast("FuzzyTree", model).nodes:
+    if model.nodes:
         raise ValueError(
             f"uses: tree {model.name!r} carries no fitted sets, so it has no raw rules"
         )

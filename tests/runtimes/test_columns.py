@@ -42,14 +42,39 @@ from fuzzytree.semantics import (
     from_rules,
     rules_from_tree,
 )
-from fuzzytree.semantics.samples import everyday_tree
 
 ROWS = np.array([[0.0, 2.0, math.nan, 1.0], [3.0, math.nan, 1.0, math.inf]])
 
 
+def _everyday_tree() -> FuzzyTree:
+    """Return a tree of a column of text, and one whose missing values have a place."""
+    west = Term("Biscoe or Dream", Band(high=1.5, right=2.0))
+    east = Term("Torgersen", Band(low=1.5, left=1.0))
+    short = Term("low", Band(high=2.0, right=4.0))
+    long = Term("high", Band(low=2.0, left=0.0))
+    first = (Branch((west.name,), node=2), Branch((east.name,), leaf=3))
+    second = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
+    names = ("Biscoe", "Dream", "Torgersen")
+    return FuzzyTree(
+        "penguins",
+        ("Adelie", "Gentoo"),
+        (
+            Variable(
+                "island", (west, east), "", 0.0, 2.0, categories=names, missing=1.0
+            ),
+            Variable("bill", (short, long), "mm", 0.0, 5.0, missing=-1.0),
+        ),
+        (
+            Node("island", (1.5,), (0, 1), first),
+            Node("bill", (2.0,), (0, 1), second),
+        ),
+        (Leaf("Adelie"), Leaf("Gentoo"), Leaf("Adelie")),
+    )
+
+
 @pytest.fixture
 def tree() -> FuzzyTree:
-    return everyday_tree()
+    return _everyday_tree()
 
 
 def test_yaml_gives_back_categories_and_stand_ins(tree: FuzzyTree) -> None:
@@ -124,7 +149,7 @@ def test_an_onnx_file_and_engines_take_the_texts_of_a_table(tmp_path: Path) -> N
     table = pd.DataFrame(
         {"island": ["Biscoe", " Dream", "Mars", None], "bill": [1.0, 3.0, 1.0, None]}
     )
-    tree = everyday_tree()
+    tree = _everyday_tree()
     expected = ["Adelie", "Gentoo", "Adelie", "Adelie"]
     assert ft.run(tree, table).classes == expected
     (tmp_path / "p.onnx").write_bytes(ft.export(tree, "onnx").content)
@@ -181,7 +206,7 @@ def test_a_query_finds_the_categories_that_run_finds(
 @pytest.mark.parametrize("dialect", ["duckdb", "sqlite"])
 def test_sql_compares_texts(dialect: Literal["duckdb", "sqlite"]) -> None:
     cells = [("Biscoe", 1.0), ("Dream", 3.0), ("Mars", 1.0), (None, None)]
-    query = sql.write(everyday_tree(), dialect=dialect, table="t").content.decode()
+    query = sql.write(_everyday_tree(), dialect=dialect, table="t").content.decode()
     is_duckdb = dialect == "duckdb"
     rows: Any = duckdb.connect() if is_duckdb else sqlite3.connect(":memory:")
     rows.execute("CREATE TABLE t (island VARCHAR, bill DOUBLE)")
@@ -192,7 +217,7 @@ def test_sql_compares_texts(dialect: Literal["duckdb", "sqlite"]) -> None:
 
 def test_every_representation_agrees_on_missing_and_unknown_cells() -> None:
     rows = pd.DataFrame({"island": ["Biscoe", "Mars", None], "bill": [None, 3.0, 9.0]})
-    report = ft.check(everyday_tree(), data=rows)
+    report = ft.check(_everyday_tree(), data=rows)
     assert report.ok
     examined = {one.representation for one in report.comparisons}
     assert {"c", "native", "onnxruntime"} <= {one.split()[0] for one in examined}

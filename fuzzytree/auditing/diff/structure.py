@@ -33,7 +33,6 @@ from fuzzytree.auditing.findings.records import FileLocation, Measure
 from fuzzytree.model import (
     Document,
     FuzzySystem,
-    Part,
     Path,
     RuleBase,
     Semantics,
@@ -348,7 +347,7 @@ class Structure:
         matches, removed, added = match_parts(
             mine,
             theirs,
-            lambda spot: _parts(spot.part) or spot.part.name,
+            lambda spot: spot.part.parts or spot.part.name,
             lambda spot: spot.part.name,
         )
         for a, b, is_other in matches:
@@ -365,14 +364,14 @@ class Structure:
 
     def _users_of(self, side: int, variable: Any) -> tuple[int, ...]:
         """Return the numbers of the rules that use a combination."""
-        users = self.users[side].items() if _parts(variable) else ()
+        users = self.users[side].items() if variable.parts else ()
         return tuple(
             sorted({n for (name, _), of in users if name == variable.name for n in of})
         )
 
     def _report_alone(self, key: str, spot: _Spot, *, is_new: bool) -> None:
         """Report that an input, an output or a combination is new, or was removed."""
-        noun, parts = _NOUNS[key], _parts(spot.part)
+        noun, parts = _NOUNS[key], spot.part.parts
         text = f"the {noun} {spot.part.name!r}"
         shown: Shown = "never" if is_new and noun == "output" else "always"
         if parts:
@@ -388,7 +387,7 @@ class Structure:
 
     def _report_sums(self, old: _Spot, new: _Spot) -> None:
         """Report that a variable of one name looks at something else."""
-        mine, theirs = ([part.input for part in _parts(s.part)] for s in (old, new))
+        mine, theirs = ([part.input for part in s.part.parts] for s in (old, new))
         gone = [name for name in mine if name not in theirs]
         come = [name for name in theirs if name not in mine]
         text = f"{new.part.name!r} sums other inputs or weights"
@@ -496,11 +495,6 @@ _NOUNS: Mapping[str, str] = {"variables": "input", "outputs": "output"}
 def _side(spot: _Spot, *, is_new: bool) -> tuple[_Spot | None, _Spot | None]:
     """Return a part of one model alone."""
     return (None, spot) if is_new else (spot, None)
-
-
-def _parts(variable: Any) -> tuple[Part, ...]:
-    """Return what a variable sums; nothing for an input or an output."""
-    return variable.parts if isinstance(variable, Variable) else ()
 
 
 def _range(variable: Any) -> str:
