@@ -12,6 +12,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.model.rulebase import Path, RuleBase, summary
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model.values import ModelKind as ModelKind
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,13 +31,7 @@ Document = FuzzyTree | RuleBase | FuzzySystem
 
 def kind_of(model: Document) -> ModelKind:
     """Return which kind of model it is."""
-    match model:
-        case FuzzySystem():
-            return "system"
-        case RuleBase():
-            return "rules"
-        case FuzzyTree():
-            return "tree"
+    return model.representation
 
 
 class Fitted(Protocol):
@@ -70,7 +65,6 @@ class ModelPath(str):
         return result
 
 
-ModelKind = Literal["tree", "rules", "system"]
 Dtype = Literal["float64", "mixed", "float32"]
 
 

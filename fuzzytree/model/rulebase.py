@@ -8,7 +8,6 @@ values below.
 from __future__ import annotations
 
 import hashlib
-import importlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import ClassVar, Final, Literal
 
@@ -33,6 +32,7 @@ from fuzzytree.model.probabilities import (
     sharpness_mistakes,
 )
 from fuzzytree.model.rules import Proposition as Proposition
+from fuzzytree.model.values import AnyModel, ModelKind
 from fuzzytree.model.values import Value as Value
 from fuzzytree.model.variables import DATE_UNIT as DATE_UNIT
 from fuzzytree.model.variables import Part as Part
@@ -121,7 +121,7 @@ class Semantics(Value, frozen=True):
 Kind = Literal["relative", "raw"]
 
 
-class RuleBase(Value, frozen=True):
+class RuleBase(AnyModel, frozen=True):
     """A named, ordered set of fuzzy rules that decides for one class.
 
     Attributes:
@@ -146,6 +146,7 @@ class RuleBase(Value, frozen=True):
     kind: Kind | None = None
     columns: tuple[str, ...] = ()
 
+    representation: ClassVar[ModelKind] = "rules"
     outputs: ClassVar[tuple[()]] = ()  # its answers are classes
     blocks: ClassVar[tuple[()]] = ()  # its rules stand alone
     nodes: ClassVar[tuple[Node, ...]] = ()
@@ -168,11 +169,6 @@ class RuleBase(Value, frozen=True):
         )
 
     @property
-    def inputs(self) -> tuple[str, ...]:
-        """The names of the columns that the rules need, in order."""
-        return tuple(v.name for v in self.variables if not v.parts)
-
-    @property
     def rule_labels(self) -> tuple[str, ...]:
         """The class of each rule, in order."""
         return tuple(rule.then for rule in self.rules)
@@ -187,12 +183,6 @@ class RuleBase(Value, frozen=True):
         return summary(
             "RuleBase", rules=rules, inputs=inputs, classes=len(self.classes)
         )
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        page = importlib.import_module("fuzzytree.report.notebook")
-        shown: str = page.model_html(self)
-        return shown
 
     def __str__(self) -> str:
         """Show the rules as numbered sentences."""

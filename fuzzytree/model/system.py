@@ -9,7 +9,6 @@ below.
 
 from __future__ import annotations
 
-import importlib
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -44,7 +43,7 @@ from fuzzytree.model.rules import (
     condition_mistakes,
     reference_mistakes,
 )
-from fuzzytree.model.values import Value
+from fuzzytree.model.values import AnyModel, ModelKind, Value
 from fuzzytree.model.variables import (
     Part,
     Term,
@@ -175,7 +174,7 @@ class SystemOutput(Value, frozen=True):
     categories: ClassVar[tuple[str, ...]] = ()
 
 
-class FuzzySystem(Value, frozen=True):
+class FuzzySystem(AnyModel, frozen=True):
     """Inputs, outputs, and blocks of rules between them.
 
     A value that is missing or not finite makes every output NaN.
@@ -197,6 +196,7 @@ class FuzzySystem(Value, frozen=True):
     blocks: tuple[RuleBlock, ...]
     note: str = ""
 
+    representation: ClassVar[ModelKind] = "system"
     classes: ClassVar[tuple[str, ...]] = ()  # its answers are numbers
     rule_labels: ClassVar[tuple[str, ...]] = ()
     columns: ClassVar[tuple[str, ...]] = ()  # it is learnt from no table
@@ -209,11 +209,6 @@ class FuzzySystem(Value, frozen=True):
     def __post_init__(self) -> None:
         """Refuse a system that contradicts itself."""
         refuse(_system_mistakes(self))
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The names of the columns that the system needs, in order."""
-        return tuple(one.name for one in self.variables if not one.parts)
 
     @property
     def all_variables(self) -> tuple[Variable | SystemOutput, ...]:
@@ -241,12 +236,6 @@ class FuzzySystem(Value, frozen=True):
             inputs=len(self.inputs),
             outputs=len(self.outputs),
         )
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        page = importlib.import_module("fuzzytree.report.notebook")
-        shown: str = page.model_html(self)
-        return shown
 
 
 def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:

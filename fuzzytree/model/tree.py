@@ -8,7 +8,6 @@ open below and closed above, so a value equal to a cut goes to the left of it.
 
 from __future__ import annotations
 
-import importlib
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,7 +28,6 @@ from fuzzytree.model.rulebase import (
     Proposition,
     Rule,
     Semantics,
-    Value,
     Variable,
     naming_mistakes,
     proposition_mistakes,
@@ -39,6 +37,7 @@ from fuzzytree.model.rulebase import (
     term_names,
     variable_mistakes,
 )
+from fuzzytree.model.values import AnyModel, ModelKind
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import Document
@@ -47,7 +46,7 @@ Use = Literal["tree", "relative", "raw"]
 """What a tree serves: its own path, its relative rules, the paper's raw rules."""
 
 
-class FuzzyTree(Value, frozen=True):
+class FuzzyTree(AnyModel, frozen=True):
     """A fuzzy decision tree.
 
     Attributes:
@@ -74,6 +73,7 @@ class FuzzyTree(Value, frozen=True):
     semantics: Semantics = Semantics()
     columns: tuple[str, ...] = ()
 
+    representation: ClassVar[ModelKind] = "tree"
     outputs: ClassVar[tuple[()]] = ()  # its answers are classes
     rules: ClassVar[tuple[Rule, ...]] = ()  # one path is followed
     blocks: ClassVar[tuple[()]] = ()
@@ -98,11 +98,6 @@ class FuzzyTree(Value, frozen=True):
         refuse(_order_mistakes(self), _plateau_mistakes(self))
 
     @property
-    def inputs(self) -> tuple[str, ...]:
-        """The names of the columns that the tree needs, in order."""
-        return tuple(v.name for v in self.variables if not v.parts)
-
-    @property
     def rule_labels(self) -> tuple[str, ...]:
         """The class of each leaf, in order."""
         return tuple(leaf.label for leaf in self.leaves)
@@ -120,12 +115,6 @@ class FuzzyTree(Value, frozen=True):
             inputs=len(self.inputs),
             classes=len(self.classes),
         )
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        page = importlib.import_module("fuzzytree.report.notebook")
-        shown: str = page.model_html(self)
-        return shown
 
     def __str__(self) -> str:
         """Show the tree as an indented outline."""

@@ -74,7 +74,7 @@ def exact_answer(model: Model, row: Mapping[str, float]) -> Exact:
         KeyError: If an input has no value.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Rule, Term
+        >>> from fuzzytree.model.rulebase import Rule, RuleBase, Term
         >>> low = Term("low", Band(high=1.0, right=4.0))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
