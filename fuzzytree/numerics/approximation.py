@@ -19,7 +19,7 @@ and less where it was less, so the same rule wins, alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 
 import msgspec
 import numpy as np
@@ -183,36 +183,19 @@ def _exchanged(reference: IntArray, error: FloatArray, worst: int) -> IntArray:
 _ROUNDING = 1.0 + 2.0**-40
 
 
-class TermError(msgspec.Struct, frozen=True):
-    """How far a term's degree can be from that of the term it stands for.
-
-    Attributes:
-        variable: The variable.
-        term: The term.
-        bound: The largest difference at any value.
-        points: How many points it has, if it became points.
-        degree: The largest degree of its polynomials, if they were fitted again.
-    """
-
-    variable: str
-    term: str
-    bound: float
-    points: int | None = None
-    degree: int | None = None
-
-
 class ApproximateRules(msgspec.Struct, frozen=True):
     """A model in the place of another.
 
     Attributes:
         model: The model.
-        terms: The terms that changed.
+        terms: How far the degree of each term that changed can be off, by the names of
+            its variable and itself.
         bound: The largest difference of a rule's strength, on any input.
         origin: Where the bound comes from.
     """
 
     model: RuleBase
-    terms: tuple[TermError, ...]
+    terms: Mapping[tuple[str, str], float]
     bound: float
     origin: str
 
@@ -270,8 +253,8 @@ def by_degree(model: RuleBase, degree: int) -> ApproximateRules:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> found = by_degree(rules_from_tree(random_tree(0), "raw"), 1)
-        >>> {term.degree for term in found.terms}
-        {1}
+        >>> 0.0 < found.bound < 0.1
+        True
     """
     if not 1 <= degree <= 8:
         raise ValueError(f"the degree must be from 1 to 8, not {degree!r}")
@@ -305,7 +288,7 @@ def _lower_side(side: Side, degree: int) -> tuple[Side, float]:
 
 def _approximated(model: RuleBase, change: Change, what: str) -> ApproximateRules:
     """Return a rule base with changed terms, and the bound of its strengths."""
-    errors: list[TermError] = []
+    errors: dict[tuple[str, str], float] = {}
     reasons: list[str] = []
 
     def changed(variable: str, term: Term) -> Term:
@@ -316,8 +299,7 @@ def _approximated(model: RuleBase, change: Change, what: str) -> ApproximateRule
             return term
         if found is None:
             return term
-        shape, bound = found
-        errors.append(TermError(variable, term.name, bound, **_size(shape)))
+        shape, errors[variable, term.name] = found
         return Term(term.name, shape)
 
     variables = tuple(
@@ -331,34 +313,20 @@ def _approximated(model: RuleBase, change: Change, what: str) -> ApproximateRule
     is_product = model.semantics.conjunction == "product"
     how = "summed" if is_product else "largest"
     origin = f"{how} certified error of a degree: {what}"
-    return ApproximateRules(
-        replace(model, variables=variables), tuple(errors), bound, origin
-    )
+    return ApproximateRules(replace(model, variables=variables), errors, bound, origin)
 
 
-def _size(shape: Shape) -> dict[str, int]:
-    """Return how many points a shape has, or the degree of its curves."""
-    match shape:
-        case Points(values=values):
-            return {"points": len(values)}
-        case Band():
-            return {"degree": 1}
-        case LR(left=left, right=right):
-            return {"degree": max(len(left.curve), len(right.curve))}
-
-
-def _strength_bound(model: RuleBase, errors: Sequence[TermError]) -> float:
+def _strength_bound(model: RuleBase, errors: Mapping[tuple[str, str], float]) -> float:
     """Return how far the strength of any rule can be from the original's.
 
     Min and max pass the largest error of a degree on, `1 - degree` keeps it, and a
     product of numbers in [0, 1] at most adds the errors of its factors.
     """
-    known = {(error.variable, error.term): error.bound for error in errors}
     worst = 0.0
     for rule in model.rules:
         propositions = [
             max(
-                known.get((proposition.variable, term), 0.0)
+                errors.get((proposition.variable, term), 0.0)
                 for term in proposition.terms
             )
             for proposition in rule.when
