@@ -220,10 +220,8 @@ class Certificate(msgspec.Struct, frozen=True):
         """Return what it says about decisions, for people."""
         if self.dtype is None:
             return "the class cannot change: every number is written in full, error 0"
-        if self.representation == "tree":
-            return self._of_paths()
         if self.delta is None:
-            return f"no bound: {'; '.join(self.reasons)}"
+            return self._of_paths()
         if self.delta >= 0.5:
             return f"any class can change: a strength can be off by {self.delta:.1e}"
         text = "the class cannot change: every strength is exact"

@@ -70,10 +70,10 @@ def forms(
         >>> list(forms(random_tree(1)))
         ['tree', 'relative rules', 'raw rules']
     """
-    if not isinstance(model, FuzzyTree):
+    if not model.leaves:
         return {kind_of(model): model}
     wanted = set(TITLES if uses is None else uses)
-    result: dict[Form, FuzzyTree | RuleBase] = {}
+    result: dict[Form, Document] = {}
     if "tree" in wanted:
         result[TITLES["tree"]] = model
     kinds: tuple[Kind, ...] = ("relative", "raw") if model.sets else ("relative",)
@@ -104,7 +104,7 @@ def rules_of(model: Document) -> RuleBase | FuzzySystem:
 
 
 def rules_from_tree(
-    tree: FuzzyTree,
+    tree: Document,
     kind: Kind = "relative",
     *,
     conjunction: Conjunction | None = None,
@@ -121,7 +121,8 @@ def rules_from_tree(
         A rule base whose rule k is leaf k, with the variables that the nodes test.
 
     Raises:
-        InvalidModelError: If `kind` is `raw` and the tree carries no sets.
+        InvalidModelError: If `kind` is `raw` and the tree carries no sets, or if the
+            model is no tree.
     """
     if kind == "raw" and tree.nodes and not tree.sets:
         raise InvalidModelError(
@@ -149,7 +150,7 @@ def rules_from_tree(
     )
 
 
-def _variables(tree: FuzzyTree, kind: Kind) -> tuple[Variable, ...]:
+def _variables(tree: Document, kind: Kind) -> tuple[Variable, ...]:
     terms: dict[str, tuple[Term, ...]]
     if kind == "relative":
         terms = {v.name: v.terms for v in tree.variables}
@@ -158,7 +159,7 @@ def _variables(tree: FuzzyTree, kind: Kind) -> tuple[Variable, ...]:
     return tuple(replace(v, terms=terms.get(v.name, ())) for v in tree.variables)
 
 
-def _rules(tree: FuzzyTree, kind: Kind) -> tuple[Rule, ...]:
+def _rules(tree: Document, kind: Kind) -> tuple[Rule, ...]:
     rules: list[Rule] = []
     start = Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
     todo: list[tuple[Branch, tuple[Proposition, ...]]] = [(start, ())]

@@ -196,10 +196,8 @@ def usual_floor(model: Model) -> float:
 
 def strength_rules(model: Model) -> RuleBase:
     """Return the rules whose firing strengths measure the certainty of a model."""
-    if isinstance(model, RuleBase):
-        return model
-    has_sets = bool(model.sets) or not model.nodes
-    return rules_from_tree(model, "raw" if has_sets else "relative")
+    is_raw = model.leaves and (model.sets or not model.nodes)
+    return rules_from_tree(model, "raw") if is_raw else rules_of(model)
 
 
 def check_inputs(model: Model, sensor: Sensor | None = None) -> None:
