@@ -41,7 +41,6 @@ from .onnx_tree import needs_plain as needs_plain
 from .onnx_tree import tree_graph as tree_graph
 from .plugins import Plugin as Plugin
 from .plugins import all_plugins as all_plugins
-from .program_text import answer_of as answer_of
 from .program_text import stated_options as stated_options
 from .python import write_python as write_python
 from .table import TABLE as TABLE

@@ -8,12 +8,12 @@ With a macro it is a program that tests itself.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
 from fuzzytree.exporters.c_fixed import Q15, Q31
 from fuzzytree.exporters.c_rules import probability_code, rules_code
-from fuzzytree.exporters.c_selftest import number_of, selftest_code
+from fuzzytree.exporters.c_selftest import selftest_code
 from fuzzytree.exporters.c_systems import system_file
 from fuzzytree.exporters.c_tables import CModel
 from fuzzytree.exporters.c_text import (
@@ -35,13 +35,17 @@ from fuzzytree.exporters.c_text import (
     whole_lines,
     whole_table,
 )
-from fuzzytree.exporters.program_text import check_rated, source_of, title_of
+from fuzzytree.exporters.program_text import (
+    class_number,
+    rated_rules,
+    source_of,
+    title_of,
+)
 from fuzzytree.model import (
     Band,
     Document,
     Format,
     FuzzySystem,
-    FuzzyTree,
     Loss,
     Model,
     Points,
@@ -52,9 +56,7 @@ from fuzzytree.model import (
     Written,
     fingerprint,
     narrowing_refusal,
-    outline,
     refusal,
-    sentence,
     stand_ins,
 )
 from fuzzytree.numerics import losses
@@ -149,8 +151,7 @@ def write_c(
     source = source_of(write_c, model, locals())
     if dtype not in _NUMBERS:
         raise ValueError(f"C has {', '.join(_NUMBERS)}, not {dtype!r}")
-    if probabilities:
-        check_rated(model, "c")
+    rated = rated_rules(model, "c") if probabilities else None
     prefix = beginning(model.name, name)
     if tolerance is not None and dtype not in ("q15", "q31"):
         raise ValueError("a tolerance is that of fixed point: dtype=q15 or q31")
@@ -179,9 +180,7 @@ def write_c(
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, "c float32", lost)
-    code = CFile(
-        model, _NUMBERS[dtype], prefix, probabilities=probabilities, source=source
-    )
+    code = CFile(model, _NUMBERS[dtype], prefix, rated=rated, source=source)
     return Written("".join(code.text(selftest=selftest)).encode("ascii"), lost)
 
 
@@ -214,13 +213,13 @@ class CFile(CModel):
         numbers: CNumbers,
         prefix: str,
         *,
-        probabilities: bool = False,
+        rated: RuleBase | None = None,
         source: str | None = None,
     ) -> None:
         super().__init__(model, numbers)
         self.prefix = prefix
         self.source = source or fingerprint(model)
-        self.probabilities = probabilities
+        self.rated = rated
 
     def text(self, *, selftest: bool) -> Iterator[str]:
         """Yield the file."""
@@ -233,7 +232,7 @@ class CFile(CModel):
 
     def declarations(self) -> Iterator[str]:
         """Yield the heading and what users of the file see, open at the end."""
-        yield from _heading(self.model, self.source)
+        yield from _heading(self.model, self.source, self.outline)
         yield self._fill(USE) + self._fill(DECLARE)
         yield from self._declarations()
 
@@ -249,19 +248,19 @@ class CFile(CModel):
             defaults["UNCOVERED"] = semantics.uncovered
         yield "\n/* The class where a value is missing, or no rule fires. */\n"
         for word, label in defaults.items():
-            yield f"#define NAME_WHEN_{word} {number_of(label, model)}\n"
+            yield f"#define NAME_WHEN_{word} {class_number(label, model)}\n"
         yield from axes_code(model.variables, self.line, self.numbers)
         is_new = has_own_values(model.variables)
         axes = _TAKE_COMBINED if is_new else _TAKE
-        if isinstance(model, FuzzyTree):
-            yield from tree_code(self, model, axes)
-        elif self.tables is not None:
+        if self.tables is None:
+            yield from tree_code(self, axes)
+        else:
             is_product = semantics.conjunction == "product"
             yield from rules_code(
                 self.tables, self.numbers, axes, is_product=is_product
             )
-        if self.probabilities and isinstance(model, RuleBase):
-            yield from probability_code(model)
+        if self.rated is not None:
+            yield from probability_code(self.rated)
 
     def _fill(self, template: str) -> str:
         return fill(template, self.prefix)
@@ -288,7 +287,7 @@ class CFile(CModel):
             yield from self._categories(variable)
         yield self._fill(_TYPES).replace("RULE,", "rule," if rules else "leaf,")
         yield self._fill(_STRENGTHS_TYPE) if rules else ""
-        yield self._fill(_PROBABILITIES_TYPE) if self.probabilities else ""
+        yield self._fill(_PROBABILITIES_TYPE) if self.rated else ""
         yield "\n#ifdef __cplusplus\n}\n#endif\n"
 
     def _categories(self, variable: Variable) -> Iterator[str]:
@@ -311,7 +310,7 @@ def has_own_values(variables: Sequence[Variable]) -> bool:
     return any(v.parts or v.missing is not None for v in variables)
 
 
-def _heading(model: Document, source: str) -> Iterator[str]:
+def _heading(model: Document, source: str, lines: Iterable[str] = ()) -> Iterator[str]:
     title = title_of(model, f'"{remark(model.name)}"')
     yield f"/* {title}. Written by fuzzytree.\n"
     yield f" * Fingerprint: {source}\n *\n * Inputs, in order:\n"
@@ -332,14 +331,7 @@ def _heading(model: Document, source: str) -> Iterator[str]:
             )
             yield f" * {remark(variable.name)}: {parts}\n"
     yield " *\n"
-    match model:
-        case RuleBase():
-            for number, rule in enumerate(model.rules, 1):
-                yield f" * {number}. {remark(sentence(rule))}\n"
-        case FuzzyTree():
-            yield from (f" * {remark(line)}\n" for line in outline(model))
-        case FuzzySystem():  # its rules are steps, and only counted
-            pass
+    yield from (f" * {remark(line)}\n" for line in lines)
 
 
 def _described(one: Variable | SystemOutput) -> str:
@@ -526,11 +518,11 @@ TAKE_AXES
 """
 
 
-def tree_code(file: CModel, tree: FuzzyTree, axes: str) -> Iterator[str]:
+def tree_code(file: CModel, axes: str) -> Iterator[str]:
     """Yield the tables of a tree and the function that walks through them."""
     tests, numbers = file.tests, file.numbers
-    numbered = {label: place for place, label in enumerate(tree.classes)}
-    labels = [numbered[leaf.label] for leaf in tree.leaves]
+    numbered = {label: place for place, label in enumerate(file.model.classes)}
+    labels = [numbered[label] for label in file.model.rule_labels]
     if not tests:
         plain = axes.replace("    const name_real *value = x;\n", "")
         text = _ONE_LEAF.replace("LABEL", str(labels[0]))

@@ -16,7 +16,6 @@ from msgspec.structs import replace
 
 from fuzzytree.exporters.c_steps import Call, CSteps
 from fuzzytree.exporters.c_text import CNumbers
-from fuzzytree.exporters.program_text import SystemExample
 from fuzzytree.model import FloatArray
 from fuzzytree.semantics import (
     ARRAYS,
@@ -44,6 +43,9 @@ _EDGES: Mapping[str, tuple[Callable[[float], int], Callable[[float], int]]] = {
     "equal": (round, round),
 }  # how a constant is rounded that stands first, or second
 _TRIES = 8
+
+SystemExample = tuple[list[float], tuple[float, ...], list[float], int]
+"""Inputs, numbers, how far each of these may be off, and the status."""
 
 
 class FixedNumbers(CNumbers):

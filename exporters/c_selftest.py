@@ -13,9 +13,9 @@ import numpy as np
 
 from fuzzytree.exporters.c_tables import HIGH_END, LOW_END, POINTS, CModel, Tables
 from fuzzytree.exporters.c_text import CNumbers, bits_of
-from fuzzytree.exporters.program_text import answer_of, digest_of
-from fuzzytree.model import Model, stand_ins
-from fuzzytree.semantics import Answer, Row, Status, few_probes
+from fuzzytree.exporters.program_text import class_number, digest_of
+from fuzzytree.model import stand_ins
+from fuzzytree.semantics import Answer, Row, Status, answer_of, few_probes
 
 _MOST_ROWS = 160
 _FEWEST_ROWS = 8
@@ -34,17 +34,12 @@ def _examples(file: CModel) -> Iterator[tuple[list[float], list[str]]]:
             with np.errstate(over="ignore"):
                 values = {k: float(np.float32(value)) for k, value in row.items()}
             answer = answer_of_tables(file, values)
-        label = number_of(answer.label, model)
+        label = class_number(answer.label, model)
         ends = [str(label), str(answer.rule), str(int(answer.status))]
         if file.tables:
             digest = digest_of(words_of(answer.strengths, numbers))
             ends.append(f"UINT32_C({digest:#010x})")
         yield [values[name] for name in model.inputs], ends
-
-
-def number_of(label: str | None, model: Model) -> int:
-    """Return the number of a class, -1 for none."""
-    return -1 if label is None else model.classes.index(label)
 
 
 def words_of(strengths: Sequence[float], numbers: CNumbers) -> list[int]:

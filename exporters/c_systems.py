@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fuzzytree.exporters.c_fixed import FixedNumbers, FixedSteps
+from fuzzytree.exporters.c_fixed import FixedNumbers, FixedSteps, SystemExample
 from fuzzytree.exporters.c_steps import LIBRARY, CSteps
 from fuzzytree.exporters.c_text import (
     DECLARE,
@@ -21,7 +21,7 @@ from fuzzytree.exporters.c_text import (
     checks,
     remark,
 )
-from fuzzytree.exporters.program_text import SystemExample, system_examples
+from fuzzytree.exporters.program_text import examples_of
 from fuzzytree.model import FuzzySystem
 from fuzzytree.numerics import short_above
 from fuzzytree.semantics import (
@@ -30,8 +30,8 @@ from fuzzytree.semantics import (
     evaluate_program,
     float32_rounding,
     from_system,
+    probes,
     spreads,
-    system_probes,
     worst_over,
 )
 
@@ -319,16 +319,14 @@ def _examples(system: FuzzySystem, *, activations: bool) -> list[SystemExample]:
     Where no bound of an error is known, a share of the number stands in its place.
     """
     limit = max(_FEWEST, min(_PROBES, _RULES // max(len(system.rules), 1)))
-    rows = system_probes(system, limit=limit)
+    rows = probes(system, limit=limit)
     every: list[SystemExample] = []
-    for operands, result, bound, status in system_examples(
-        system, rows, activations=activations
-    ):
+    for one in examples_of(system, rows, activations=activations):
         most = [
-            0.0 if math.isnan(number) else min(one, _SHARE * max(abs(number), 1.0))
-            for one, number in zip(bound, result, strict=True)
+            0.0 if math.isnan(number) else min(bound, _SHARE * max(abs(number), 1.0))
+            for bound, number in zip(one.bounds, one.numbers, strict=True)
         ]
-        every.append((operands, result, most, status))
+        every.append((one.values, one.numbers, most, int(one.answer.status)))
     every.sort(key=lambda one: max(one[2]))
     step = max(len(every) // (2 * _ROWS), 1)
     return every[: _ROWS * step : step]

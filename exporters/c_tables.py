@@ -10,12 +10,15 @@ from fuzzytree.exporters.program_text import TreeTest, places_of, tree_tests
 from fuzzytree.model import (
     LR,
     Band,
+    FuzzyTree,
     Model,
     Points,
     Proposition,
     RuleBase,
     Shape,
     Side,
+    outline,
+    sentence,
     shapes_of,
 )
 
@@ -220,6 +223,7 @@ class CModel:
         line: The place of each variable's value.
         tests: Of a tree.
         tables: Of a rule base, else None.
+        outline: The rules or the tree for people, a line each.
     """
 
     def __init__(self, model: Model, numbers: CNumbers) -> None:
@@ -227,7 +231,11 @@ class CModel:
         self.line = places_of(model.variables)
         self.tests: list[TreeTest] = []
         self.tables: Tables | None = None
-        if isinstance(model, RuleBase):
-            self.tables = tables_of(model, self.line, numbers)
-        else:
-            self.tests = tree_tests(model)
+        match model:
+            case RuleBase():
+                self.tables = tables_of(model, self.line, numbers)
+                sentences = map(sentence, model.rules)
+                self.outline = [f"{k}. {text}" for k, text in enumerate(sentences, 1)]
+            case FuzzyTree():
+                self.tests = tree_tests(model)
+                self.outline = [*outline(model)]

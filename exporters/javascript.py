@@ -31,12 +31,12 @@ from fuzzytree.exporters.js_text import (
     text_of,
 )
 from fuzzytree.exporters.program_text import (
-    answer_of,
-    check_rated,
+    class_number,
+    examples_of,
     node_rows,
     places_of,
+    rated_rules,
     source_of,
-    system_examples,
     title_of,
 )
 from fuzzytree.model import (
@@ -59,7 +59,6 @@ from fuzzytree.semantics import (
     from_rules,
     from_system,
     row_probabilities,
-    system_probes,
 )
 
 _DECISION: tuple[ResultKind, ...] = ("class", "rule", "status", "strength")
@@ -104,9 +103,8 @@ def write(
     """
     source = source_of(write, model, locals())
     del allow_loss
-    if probabilities:
-        check_rated(model, "javascript")
-    body = "".join(_body(model, probabilities=probabilities))
+    rated = rated_rules(model, "javascript") if probabilities else None
+    body = "".join(_body(model, rated))
     ending = AS_MODULE if module == "es" else AS_SCRIPT
     ending = filled(ending, doors=", ".join(_doors(model)), name=text_of(model.name))
     if module == "script":
@@ -126,7 +124,7 @@ def _doors(model: Document) -> tuple[str, ...]:
     return ("INPUTS", "CLASSES", "decide", *strengths, "answer", "selfTest")
 
 
-def _body(model: Document, *, probabilities: bool) -> Iterator[str]:
+def _body(model: Document, rated: RuleBase | None) -> Iterator[str]:
     yield START
     inputs = (_entry_of(one) for one in model.variables if not one.parts)
     yield from table("INPUTS", inputs)
@@ -135,33 +133,30 @@ def _body(model: Document, *, probabilities: bool) -> Iterator[str]:
             yield from _classes(model)
             yield from _tree(model)
             yield filled(DECIDE, what="class, leaf number and status", strengths="")
-            examples = _examples(model)
         case RuleBase():
             yield from _classes(model)
             comments = [*_DECISION[:3], *map(sentence, model.rules)]
             kinds, shown = _DECISION, ", strengths"
             what = "class, rule number, status and strengths"
-            if probabilities:
+            if rated is not None:
                 kinds = (*_DECISION, "probability")
                 comments += [f"probability of {name}" for name in model.classes]
                 what += ", and probabilities"
                 count = len(model.rules)
                 shown = f", strengths: strengths.slice(0, {count})"
                 shown += f", probabilities: strengths.slice({count})"
-            program = from_rules(model, probabilities=probabilities)
+            program = from_rules(model, probabilities=rated is not None)
             yield from _numbers(program, kinds, comments)
             yield filled(DECIDE, what=what, strengths=shown)
             yield STRENGTHS
-            examples = _examples(model, probabilities=probabilities)
         case FuzzySystem():
             yield from table("OUTPUTS", map(_entry_of, model.outputs))
             yield from _numbers(from_system(model, activations=True), _INFERENCE)
             yield INFER
-            examples = _system_examples(model)
     yield ROWS
     yield "\n/* Inputs, numbers, and how far these may be off: only where functions"
     yield "\n * such as exp have last digits of their own. */"
-    yield from table("EXAMPLES", examples)
+    yield from table("EXAMPLES", _examples(model, rated))
     yield TEST
 
 
@@ -195,9 +190,8 @@ def _tree(tree: FuzzyTree) -> Iterator[str]:
     yield "\nfunction numbers(x) {\n"
     yield from steps.body()
     axes = ", ".join(map(steps.value, program.of("output")))
-    label = tree.semantics.missing
-    missing = -1 if label is None else tree.classes.index(label)
-    yield filled(TREE.removeprefix("\n"), axes=axes, missing=str(missing))
+    missing = str(class_number(tree.semantics.missing, tree))
+    yield filled(TREE.removeprefix("\n"), axes=axes, missing=missing)
     yield HELPERS["below"]
 
 
@@ -223,23 +217,18 @@ def _numbers(
     yield from steps.helpers()
 
 
-def _examples(model: Model, *, probabilities: bool = False) -> Iterator[str]:
-    """Yield rows and the predictions of the reference."""
+def _examples(model: Document, rated: RuleBase | None) -> Iterator[str]:
+    """Yield rows, the answers of the reference, and how far numbers may be off."""
     most = min(_MOST_EXAMPLES, _STRENGTHS // max(len(model.rules), 1))
-    for row in few_probes(model, max(most, _FEWEST_EXAMPLES)):
-        values = [row[name] for name in model.inputs]
-        one = answer_of(model, row)
-        place = -1 if one.label is None else model.classes.index(one.label)
-        expected = [place, one.rule, int(one.status), *one.strengths]
-        if probabilities and isinstance(model, RuleBase):
-            expected += row_probabilities(model, one)
-        yield f"{literal([values, expected, []])},"
-
-
-def _system_examples(system: FuzzySystem) -> Iterator[str]:
-    rows = system_probes(system, limit=_MOST_EXAMPLES)
-    for values, outputs, bounds, status in system_examples(system, rows):
-        yield f"{literal([values, [*outputs, status], bounds])},"
+    rows = few_probes(model, max(most, _FEWEST_EXAMPLES))
+    for values, answer, bounds in examples_of(model, rows):
+        expected: list[float] = [*answer.outputs, int(answer.status)]
+        if not model.outputs:
+            place = class_number(answer.label, model)
+            expected = [place, answer.rule, *expected, *answer.strengths]
+        if rated is not None:
+            expected += row_probabilities(rated, answer)
+        yield f"{literal([values, expected, bounds])},"
 
 
 FORMAT = Format(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import msgspec
 
 from fuzzytree.errors import MissingExtraError, install_hint
-from fuzzytree.exporters.program_text import check_rated
+from fuzzytree.exporters.program_text import rated_rules
 from fuzzytree.model import (
     Dtype,
     Format,
@@ -225,7 +225,7 @@ def check_outputs(
             "outputs: a tree has no strengths; write its rules to have them"
         )
     if "probabilities" in outputs:
-        check_rated(model, "outputs")
+        rated_rules(model, "outputs")
 
 
 def check_versions(opset: int, ir: int) -> None:
@@ -296,7 +296,8 @@ def _model_proto(
         "probabilities": (TensorProto.DOUBLE, ["rows", len(model.classes)]),
         "outputs": (degree, ["rows", len(model.outputs)]),
     }
-    facts = _facts(model, dtype, columns, outputs)
+    kind, text = _in_words(model, dtype)
+    facts = _facts(model, dtype, columns, outputs, kind)
     match model:
         case FuzzyTree() if not readable:
             onnx_ends.fill_inputs(graph, model, columns)
@@ -324,7 +325,7 @@ def _model_proto(
         ("inputs", np_to_onnx(numbers.axis), ["rows", len(columns) or "columns"]),
         {name: kinds[name] for name in outputs},
         ir=ir,
-        text=_in_words(model, dtype),
+        text=text,
         facts=facts,
     )
 
@@ -334,18 +335,9 @@ def _facts(
     dtype: Dtype,
     columns: Sequence[str],
     outputs: Sequence[Output],
+    kind: str,
 ) -> dict[str, str]:
     """Return the metadata: plain words where possible, JSON for lists and records."""
-    kind: str = kind_of(model)
-    semantics, names = {}, {}
-    match model:
-        case FuzzySystem():
-            names = {"names": [output.name for output in model.outputs]}
-        case FuzzyTree():
-            kind, semantics = "descent", msgspec.to_builtins(model.semantics)
-        case RuleBase():
-            kind = model.kind or kind
-            semantics = msgspec.to_builtins(model.semantics)
     units = {one.name: one.unit for one in model.variables if one.name in columns}
     records: dict[str, object] = {
         "columns": list(columns),
@@ -354,9 +346,10 @@ def _facts(
         "classes": list(model.classes),
         "rules": len(model.rule_labels) or len(model.rules),
         "outputs": list(outputs),
-        "semantics": semantics,
-        **names,
+        "semantics": {} if model.outputs else msgspec.to_builtins(model.semantics),
     }
+    if model.outputs:
+        records["names"] = [output.name for output in model.outputs]
     if known := {v.name: v.categories for v in model.variables if v.categories}:
         records["categories"] = known
     if stand := stand_ins(model.variables):
@@ -383,29 +376,33 @@ def facts_of(
     }
 
 
-def _in_words(model: Model | FuzzySystem, dtype: Dtype) -> str:
+def _in_words(model: Model | FuzzySystem, dtype: Dtype) -> tuple[str, str]:
+    """Return the kind of a graph, and what it computes, for people."""
+    answer = _answer(model.semantics.missing)
     match model:
         case FuzzySystem():
-            answer, numbers = "NaN", ", ".join(repr(one.name) for one in model.outputs)
+            kind, answer = "system", "NaN"
+            numbers = ", ".join(repr(one.name) for one in model.outputs)
             what = (
                 f"The fuzzy system {model.name!r} with {len(model.rules)} rules: it "
                 f"computes {numbers}."
             )
         case FuzzyTree():
-            answer = _answer(model.semantics.missing)
+            kind = "descent"
             what = (
                 f"The fuzzy decision tree {model.name!r} with {len(model.leaves)} "
                 "leaves: one path is followed, a value equal to a cut goes to the left."
             )
         case RuleBase():
-            answer = _answer(model.semantics.missing)
+            kind = model.kind or "rules"
             what = (
                 f"The fuzzy rule base {model.name!r} with {len(model.rules)} rules: AND"
                 f" is {model.semantics.conjunction}, the first of the strongest rules "
                 "decides, and where none fires the answer is "
                 f"{_answer(model.semantics.uncovered)}."
             )
-    return f"{what} Missing and infinite values give {answer}. Numbers: {dtype}."
+    what += f" Missing and infinite values give {answer}. Numbers: {dtype}."
+    return kind, what
 
 
 def _answer(label: str | None) -> str:

@@ -124,8 +124,7 @@ def flat_guard(graph: OnnxGraph, model: Model, columns: Sequence[str]) -> InputB
 def _direct(model: Model) -> tuple[str, ...]:
     """Return the inputs that are used, or that no combination guards."""
     used = {proposition.variable for rule in model.rules for proposition in rule.when}
-    if isinstance(model, FuzzyTree):
-        used = {node.variable for node in model.nodes}
+    used |= {node.variable for node in model.nodes}
     guarded = {part.input for variable in model.variables for part in variable.parts}
     return tuple(n for n in model.inputs if n in used or n not in guarded)
 

@@ -11,15 +11,14 @@ import numpy.typing as npt
 import onnxruntime
 
 from fuzzytree.errors import DisagreementError, LossError
-from fuzzytree.exporters.program_text import answer_of, system_examples
-from fuzzytree.model import Document, FuzzySystem, RuleBase, stand_ins
+from fuzzytree.exporters.program_text import examples_of, rated_rules
+from fuzzytree.model import Document, stand_ins
 from fuzzytree.numerics import RealKind
 from fuzzytree.semantics import (
     Row,
     few_probes,
-    from_system,
+    program_of,
     row_probabilities,
-    system_probes,
 )
 
 _STATE = importlib.import_module("onnxruntime.capi.onnxruntime_pybind11_state")
@@ -107,7 +106,7 @@ def prove(
     values = values.reshape(len(rows), len(columns))
     result = _run(content, model.name, names, values)
     known = stand_ins(model.variables)
-    every = zip(rows, _expected(model, rows), strict=True)
+    every = zip(rows, _expected(model, rows, names), strict=True)
     for number, (row, (expected, allowed)) in enumerate(every):
         if not is_exact and all(
             math.isfinite(value) or name in known for name, value in row.items()
@@ -143,44 +142,32 @@ def _run(
 
 def _rows(model: Document) -> Sequence[Row]:
     """Return rows on which a file is run, more of a small model."""
-    if isinstance(model, FuzzySystem):
-        size = from_system(model, activations=True).size
-        limit = min(_MOST_ROWS, _MOST_OPERATIONS // size)
-        return system_probes(model, limit=max(1, limit))
-    size = 6 * sum(len(c.terms) for rule in model.rules for c in rule.when) or 1
-    limit = min(_MOST_ROWS, _MOST_OPERATIONS // size)
-    rows = few_probes(model, max(1, limit))
-    return [*rows, dict.fromkeys(model.inputs, math.nan)]
+    size = program_of(model).size
+    limit = max(1, min(_MOST_ROWS, _MOST_OPERATIONS // size))
+    return [*few_probes(model, limit), dict.fromkeys(model.inputs, math.nan)]
 
 
 Values = Mapping[str, Sequence[float | str]]
 Bounds = Mapping[str, Sequence[float]]
 
 
-def _expected(model: Document, rows: Sequence[Row]) -> Iterator[tuple[Values, Bounds]]:
+def _expected(
+    model: Document, rows: Sequence[Row], names: Sequence[str]
+) -> Iterator[tuple[Values, Bounds]]:
     """Yield the reference's values of each output, and how far they may be off."""
-    if isinstance(model, FuzzySystem):
-        first = len(model.outputs)
-        examples = system_examples(model, rows, activations=True)
-        for _, numbers, bounds, status in examples:
-            values = {"outputs": numbers[:first], "activations": numbers[first:]}
-            most = {"outputs": bounds[:first], "activations": bounds[first:]}
-            yield {**values, "status": [status]}, most
-        return
-    for row in rows:
-        answer = answer_of(model, row)
-        yield (
-            {
-                "rule": [answer.rule],
-                "label": [answer.label or ""],
-                "status": [int(answer.status)],
-                "strengths": answer.strengths,
-                "probabilities": row_probabilities(model, answer)
-                if isinstance(model, RuleBase) and model.semantics.sharpness
-                else (),
-            },
-            {},
-        )
+    rated = rated_rules(model, "onnx") if "probabilities" in names else None
+    count = len(model.outputs)
+    for _, answer, bounds in examples_of(model, rows, activations=True):
+        values: Values = {
+            "rule": [answer.rule],
+            "label": [answer.label or ""],
+            "status": [int(answer.status)],
+            "strengths": answer.strengths,
+            "probabilities": row_probabilities(rated, answer) if rated else (),
+            "outputs": answer.outputs,
+            "activations": answer.strengths,
+        }
+        yield values, {"outputs": bounds[:count], "activations": bounds[count:]}
 
 
 def _is_near(

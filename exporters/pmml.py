@@ -32,8 +32,8 @@ from fuzzytree.exporters.pmml_elements import (
 )
 from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields, step_value
 from fuzzytree.exporters.program_text import (
-    check_rated,
     named_steps,
+    rated_rules,
     source_of,
     strengths_of,
     title_of,
@@ -101,26 +101,28 @@ def write(
     if curves not in ("exact", "points"):
         raise ValueError(f"curves are exact or points, not {curves!r}")
     if probabilities:
-        check_rated(model, "pmml")
+        rated_rules(model, "pmml")
     losses: tuple[Loss, ...] = ()
-    if curves == "points":
-        if not isinstance(model, RuleBase):
-            raise ValueError("curves: points are for rules; a tree or a system is none")
-        model, losses = pointed(model, tolerance)
-        if losses and not allow_loss:
-            raise refusal(model.name, "pmml", losses)
-    if isinstance(model, FuzzySystem):
-        return _written_system(model)
+    if curves == "points" and (model.outputs or not model.rules):
+        raise ValueError("curves: points are for rules; a tree or a system is none")
+    match model:
+        case FuzzySystem():
+            return _written_system(model)
+        case FuzzyTree():
+            names = _Names(model)
+            fields, body = _tree(model, names)
+        case RuleBase():
+            if curves == "points":
+                model, losses = pointed(model, tolerance)
+            if losses and not allow_loss:
+                raise refusal(model.name, "pmml", losses)
+            names = _Names(model)
+            fields, body = _rules(
+                model, names, is_exact=curves == "exact", is_rated=probabilities
+            )
     source = source_of(write, model, locals())
-    names = _Names(model)
     functions = names.functions
     axes = [*_axes(model.variables, functions)]
-    if isinstance(model, RuleBase):
-        fields, body = _rules(
-            model, names, is_exact=curves == "exact", is_rated=probabilities
-        )
-    else:
-        fields, body = _tree(model, names)
     transformations = [*functions.defined.values(), *axes, *fields]
     values = [element("Value", value=name) for name in model.classes]
     target = element("DataField", *values, name=names.target, **TEXT)

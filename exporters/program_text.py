@@ -13,15 +13,14 @@ from msgspec.structs import replace
 
 from fuzzytree.model import (
     Document,
-    FuzzySystem,
     FuzzyTree,
-    Model,
     Node,
     RuleBase,
     Variable,
     Written,
     fingerprint,
     intervals,
+    kind_of,
 )
 from fuzzytree.numerics import rounded
 from fuzzytree.semantics import (
@@ -30,12 +29,10 @@ from fuzzytree.semantics import (
     Row,
     Step,
     StepValue,
-    descend,
+    answer_of,
     error_bounds,
-    evaluate,
     from_rules,
-    from_system,
-    infer,
+    program_of,
     still_results,
 )
 
@@ -65,25 +62,31 @@ class NumberType:
         return result
 
 
-def check_rated(model: Document, form: str) -> None:
-    """Refuse to write probabilities that a model does not have.
+def rated_rules(model: Document, form: str) -> RuleBase:
+    """Return a rule base that has probabilities.
 
     Raises:
-        ValueError: If it is no rule base with probabilities.
+        ValueError: If the model is no such rule base.
     """
-    if isinstance(model, FuzzySystem):
+    if isinstance(model, RuleBase) and model.semantics.sharpness:
+        return model
+    if model.outputs:
         raise ValueError(f"{form}: a fuzzy system has no probabilities of classes")
     if not model.semantics.sharpness:
         raise ValueError(f"{form}: {model.name!r} has no probabilities")
-    if isinstance(model, FuzzyTree):
-        text = "a tree's path gives no probabilities; write its rules to have them"
-        raise ValueError(f"{form}: {text}")
+    text = "a tree's path gives no probabilities; write its rules to have them"
+    raise ValueError(f"{form}: {text}")
 
 
 def title_of(model: Document, name: str) -> str:
     """Return what a file is of, with the model's name as the file may write it."""
-    kinds = {FuzzyTree: "tree", RuleBase: "rule base", FuzzySystem: "system"}
-    return f"A fuzzy {kinds[type(model)]}, named {name}"
+    kind = {"rules": "rule base"}.get(kind_of(model), kind_of(model))
+    return f"A fuzzy {kind}, named {name}"
+
+
+def class_number(label: str | None, model: Document) -> int:
+    """Return the place of a class, -1 for none."""
+    return -1 if label is None else model.classes.index(label)
 
 
 def source_of(
@@ -286,11 +289,6 @@ class ScriptSteps(StepText):
         yield from (text for name, text in self.functions.items() if name in self.needs)
 
 
-def answer_of(model: Model, row: Row) -> Answer:
-    """Return the reference's prediction for a row."""
-    return descend(model, row) if isinstance(model, FuzzyTree) else evaluate(model, row)
-
-
 def digest_of(words: Sequence[int]) -> int:
     """Return 32 bits that change if any bit of some words of 32 bits does."""
     digest = 2166136261
@@ -299,23 +297,38 @@ def digest_of(words: Sequence[int]) -> int:
     return digest
 
 
-SystemExample = tuple[list[float], tuple[float, ...], list[float], int]
-"""Inputs, numbers, how far each of these may be off, and the status."""
+class Example(NamedTuple):
+    """What a model answers to the values of its inputs.
+
+    Attributes:
+        values: Of the inputs, in order.
+        answer: The reference's.
+        bounds: How far numbers may be off: outputs, and activations if wanted.
+    """
+
+    values: list[float]
+    answer: Answer
+    bounds: list[float]
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The numbers that have bounds."""
+        return (self.answer.outputs + self.answer.strengths)[: len(self.bounds)]
 
 
-def system_examples(
-    system: FuzzySystem, rows: Sequence[Row], *, activations: bool = False
-) -> Iterator[SystemExample]:
-    """Yield what the inference answers to rows: outputs, and activations if wanted."""
-    program = from_system(system, activations=activations)
-    table = np.array([[row[name] for row in rows] for name in program.inputs])
-    values = table.reshape(len(program.inputs), len(rows)).astype(np.float64)
-    every: list[list[float]] = error_bounds(program, values)[:-1].T.tolist()
+def examples_of(
+    model: Document, rows: Sequence[Row], *, activations: bool = False
+) -> Iterator[Example]:
+    """Yield what the reference answers to rows, of a system with bounds."""
+    every: list[list[float]] = [[] for _ in rows]
+    if model.outputs:
+        program = program_of(model, with_strengths=activations)
+        table = np.array([[row[name] for row in rows] for name in program.inputs])
+        values = table.reshape(len(program.inputs), len(rows)).astype(np.float64)
+        every = error_bounds(program, values)[:-1].T.tolist()
     for row, bounds in zip(rows, every, strict=True):
-        answer = infer(system, row)
-        result = answer.outputs + (answer.activations if activations else ())
-        operands = [row[name] for name in system.inputs]
-        yield operands, result, bounds, int(answer.status)
+        operands = [row[name] for name in model.inputs]
+        yield Example(operands, answer_of(model, row), bounds)
 
 
 TableRow = tuple[object, ...]

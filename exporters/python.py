@@ -17,10 +17,9 @@ from typing import ClassVar
 
 from fuzzytree.exporters.program_text import (
     ScriptSteps,
-    answer_of,
+    examples_of,
     node_rows,
     places_of,
-    system_examples,
     title_of,
 )
 from fuzzytree.model import (
@@ -43,7 +42,6 @@ from fuzzytree.semantics import (
     from_rules,
     from_system,
     probes,
-    system_probes,
 )
 
 _EXAMPLES = 6
@@ -446,22 +444,16 @@ def _doors(model: Document, inputs: Sequence[Variable]) -> Iterator[str]:
 
 
 def _examples(model: Document) -> Iterator[str]:
-    """Yield rows and the predictions of the reference, the last with missing values."""
-    if isinstance(model, FuzzySystem):
-        inputs = system_probes(model, limit=_EXAMPLES)
-        inputs.append(dict.fromkeys(model.inputs, math.nan))
-        for given, outputs, bounds, number in system_examples(model, inputs):
-            row_of = tuple(given), (*outputs, float(number)), (*bounds, 0.0)
-            yield f"{_literal(row_of)},"
-        return
+    """Yield rows and the answers of the reference, the last with missing values."""
     rows = probes(model, limit=_EXAMPLES)
     if model.inputs:
         rows.append(dict.fromkeys(model.inputs, math.nan))
-    for row in rows:
-        prediction = answer_of(model, row)
-        values = tuple(row[name] for name in model.inputs)
-        expected = (prediction.label, prediction.rule, int(prediction.status))
-        yield f"({_literal(values)}, {_literal(expected)}),"
+    for values, answer, bounds in examples_of(model, rows):
+        status = int(answer.status)
+        parts: tuple[object, ...] = ((answer.label, answer.rule, status),)
+        if model.outputs:
+            parts = (*answer.outputs, float(status)), (*bounds, 0.0)
+        yield f"{_literal((tuple(values), *parts))},"
 
 
 FORMAT = Format(

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, get_args
 
 from fuzzytree.errors import LossError, MissingExtraError
-from fuzzytree.exporters.program_text import check_rated, source_of, title_of
+from fuzzytree.exporters.program_text import rated_rules, source_of, title_of
 from fuzzytree.exporters.sql_reach import LARGEST
 from fuzzytree.exporters.sql_steps import REMEDY, SqlSteps
 from fuzzytree.exporters.sql_text import LIMITS, TRANSLATED, Dialect, Query
@@ -97,7 +97,7 @@ def write(
     if not table:
         raise ValueError("table: must name a table or a view, not ''")
     if probabilities:
-        check_rated(model, "sql")
+        rated_rules(model, "sql")
     names = (keep,) if isinstance(keep, str) else tuple(keep)
     query = Query(dialect, table, names or model.inputs)
     match model:

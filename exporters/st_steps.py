@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.exporters.program_text import StepText, strengths_of
+from fuzzytree.exporters.program_text import StepText, class_number, strengths_of
 from fuzzytree.exporters.st_text import Declaration, StNumbers, remark, table
 from fuzzytree.model import RuleBase, sentence
 from fuzzytree.semantics import BELOW_ONE, Program, Step, still_results
@@ -395,8 +395,7 @@ class RuleSteps(StSteps):
 def decision(rules: RuleBase, numbers: StNumbers) -> Iterator[str]:
     """Yield statements that find the first of the strongest rules."""
     zero = numbers.literal(0.0)
-    uncovered = rules.semantics.uncovered
-    none = -1 if uncovered is None else rules.classes.index(uncovered)
+    none = class_number(rules.semantics.uncovered, rules)
     yield "    rule := 1;\n"
     yield "    status := 0;\n"
     yield f"    FOR k := 2 TO {len(rules.rules)} DO\n"

@@ -11,13 +11,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Literal
 
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.plcopen_xml import plcopen_text
-from fuzzytree.exporters.program_text import source_of, targets_of
+from fuzzytree.exporters.program_text import (
+    class_number,
+    source_of,
+    strengths_of,
+    targets_of,
+)
 from fuzzytree.exporters.st_steps import RuleSteps, SystemSteps, decision
 from fuzzytree.exporters.st_text import (
     LONG,
@@ -95,34 +101,32 @@ def write(
     source = source_of(write, model, locals())
     del allow_loss
     numbers = LONG if dtype == "float64" else SINGLE
-    if isinstance(model, FuzzySystem):
-        return _written_system(model, numbers, name, source, layout)
+    match model:
+        case FuzzySystem():
+            return _written_system(model, numbers, name, source, layout)
+        case RuleBase():
+            make, count = partial(_rules, model), len(strengths_of(model)[0].steps)
+        case FuzzyTree():
+            make, count = partial(_tree, model), 0
     mixed = [variable for variable in model.variables if variable.parts]
     combined = {variable.name: f"mix_{k}" for k, variable in enumerate(mixed, 1)}
-    taken = _taken(model, combined)
+    filled = {name: f"in_{k}" for k, name in enumerate(stand_ins(model.variables), 1)}
+    steps = [f"{letter}{k}" for letter in "vbnt" for k in range(count)]
+    taken = [*_OUTPUTS, *_LOCALS, *combined.values(), *filled.values(), *steps]
     given = name or model.name
     names = identifiers(model.inputs, taken)
     block = identifiers([given], [*taken, *names.accepted.values()])[given]
-    filled = {name: f"in_{k}" for k, name in enumerate(stand_ins(model.variables), 1)}
     values = {**names.accepted, **filled, **combined}
-    if isinstance(model, RuleBase):
-        constants, local, body = _rules(model, values, numbers)
-    else:
-        constants, local, body = _tree(model, values, numbers)
-    local = [
-        *(
-            Declaration(combined[v.name], numbers.name, (remark(v.name),))
-            for v in mixed
-        ),
-        *(Declaration(name, numbers.name) for name in filled.values()),
-        *local,
-    ]
+    constants, local, body = make(values, numbers)
+    kind = numbers.name
+    own = [Declaration(combined[v.name], kind, (remark(v.name),)) for v in mixed]
+    own += [Declaration(name, kind) for name in filled.values()]
     body = [
         *_fill(model, names, filled, numbers),
         *_guard(model, values, mixed, combined, numbers),
         *body,
     ]
-    parts, outputs = (constants, local, body), _outputs(model, numbers)
+    parts, outputs = (constants, [*own, *local], body), _outputs(model, numbers)
     content = _block(model, block, source, numbers, names, outputs, parts)
     return _written(given, names, content, layout)
 
@@ -159,18 +163,6 @@ def _written(given: str, names: NameMap, block: Block, layout: Layout) -> Writte
     if block.name != given:
         changed.insert(0, f"{given!r} is called {block.name}")
     return Written(text.encode("ascii"), (), tuple(changed))
-
-
-def _taken(model: Model, combined: Mapping[str, str]) -> list[str]:
-    """Return the names that neither an input nor the function block may have."""
-    count = (
-        len(RuleSteps(model, {}, LONG).program.steps)
-        if isinstance(model, RuleBase)
-        else 0
-    )
-    steps = [f"{letter}{k}" for letter in "vbnt" for k in range(count)]
-    filled = [f"in_{k}" for k, _ in enumerate(stand_ins(model.variables), 1)]
-    return [*_OUTPUTS, *_LOCALS, *combined.values(), *filled, *steps]
 
 
 def _outputs(model: Model, numbers: StNumbers) -> Iterator[Declaration]:
@@ -220,8 +212,7 @@ def _guard(
             test = f"NOT (ABS({total}) <= {largest})"
             yield f"    IF {test} THEN is_known := FALSE; END_IF;\n"
         yield "END_IF;\n"
-    missing = model.semantics.missing
-    label = -1 if missing is None else model.classes.index(missing)
+    label = class_number(model.semantics.missing, model)
     yield "IF NOT is_known THEN\n"
     yield f"    class_number := {label};\n    rule := 0;\n    status := 3;\n"
     if model.rules:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Final
 
 import msgspec
@@ -52,6 +53,7 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     FuzzyTree,
+    Leaf,
     Linear,
     Loss,
     Model,
@@ -59,6 +61,7 @@ from fuzzytree.model import (
     PiCurve,
     Points,
     Probabilities,
+    Rule,
     RuleBase,
     RuleBlock,
     Semantics,
@@ -101,37 +104,38 @@ def write(model: Document, /, *, allow_loss: bool = False) -> Written:
         >>> print(write(random_tree(1, leaves=1)).content.decode().splitlines()[0])
         # A fuzzy decision tree of fuzzytree: node 1 is the root.
     """
-    losses = [*name_losses(_names(model)), *_losses(model)]
+    match model:
+        case RuleBase():
+            own, entries = _rule_losses(model), partial(_rule_base, model)
+        case FuzzyTree():
+            own, entries = _tree_losses(model), partial(_tree, model)
+        case FuzzySystem():
+            own, entries = _system_losses(model), partial(_system, model)
+    losses = [*name_losses(_names(model)), *own]
     if losses:
         text = "\n".join(f"{loss.where}: {loss.what}" for loss in losses)
         raise LossError(f"cannot write {model.name[:100]} as yaml: {text}")
-    match model:
-        case RuleBase():
-            entries = _rule_base(model)
-        case FuzzyTree():
-            entries = _tree(model)
-        case FuzzySystem():
-            entries = _system(model)
-    return Written(joined(model.name, _TITLES[str(entries["kind"])], entries))
+    whole = entries()
+    return Written(joined(model.name, _TITLES[str(whole["kind"])], whole))
 
 
-def _losses(model: Document) -> Iterator[Loss]:
-    counts: list[tuple[str, int | None]] = []
-    match model:
-        case FuzzySystem():
-            yield from _system_losses(model)
-        case RuleBase():
-            counts = [(f"rule {n}", r.support) for n, r in enumerate(model.rules, 1)]
-            shared = {id(one): one for rule in model.rules for one in rule.when}
-            texts = {key: condition_sentence(one) for key, one in shared.items()}
-            for number, rule in enumerate(model.rules, 1):
-                yield from _long(f"rule {number}", [texts[id(p)] for p in rule.when])
-        case FuzzyTree():
-            counts = [(f"leaf {n}", r.support) for n, r in enumerate(model.leaves, 1)]
-            yield from name_losses(("pattern", leaf.pattern) for leaf in model.leaves)
-    for where, count in counts:
-        if count is not None and count > LARGEST_COUNT:
-            yield Loss(where, f"the support is above {LARGEST_COUNT}")
+def _rule_losses(rules: RuleBase) -> Iterator[Loss]:
+    shared = {id(one): one for rule in rules.rules for one in rule.when}
+    texts = {key: condition_sentence(one) for key, one in shared.items()}
+    for number, rule in enumerate(rules.rules, 1):
+        yield from _long(f"rule {number}", [texts[id(p)] for p in rule.when])
+    yield from _count_losses("rule", rules.rules)
+
+
+def _tree_losses(tree: FuzzyTree) -> Iterator[Loss]:
+    yield from name_losses(("pattern", leaf.pattern) for leaf in tree.leaves)
+    yield from _count_losses("leaf", tree.leaves)
+
+
+def _count_losses(what: str, parts: Sequence[Rule | Leaf]) -> Iterator[Loss]:
+    for number, part in enumerate(parts, 1):
+        if part.support is not None and part.support > LARGEST_COUNT:
+            yield Loss(f"{what} {number}", f"the support is above {LARGEST_COUNT}")
 
 
 def _names(model: Document) -> Iterator[tuple[str, str]]:

@@ -87,14 +87,14 @@ def test_a_row_aimed_at_a_rule_fires_it(condition: Condition) -> None:
     aim = Aim(system)
     for _ in range(20):
         row = aim.row(system.rules[0])
-        assert infer(system, row).activations[0] > 0.0
+        assert infer(system, row).strengths[0] > 0.0
 
 
 def test_a_row_is_aimed_at_a_rule_on_a_combination() -> None:
     mix = Variable("mix", (NEVER,), parts=(Part("a", 2.0, 0.5), Part("b", -3.0)))
     rule = SystemRule(Proposition("mix", ("never",)), THEN)
     system = FuzzySystem("s", (*INPUTS, mix), (OUTPUT,), (RuleBlock((rule,)),))
-    assert infer(system, Aim(system).row(rule)).activations[0] > 0.0
+    assert infer(system, Aim(system).row(rule)).strengths[0] > 0.0
 
 
 def test_every_rule_that_can_fire_fires_in_a_probe_of_a_check() -> None:

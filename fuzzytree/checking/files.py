@@ -54,8 +54,6 @@ from fuzzytree.runtimes import (
     OnnxModel,
     Options,
     ProgramOutcome,
-    system_numbers,
-    system_outcome,
 )
 from fuzzytree.semantics import (
     ResultKind,
@@ -532,7 +530,8 @@ def _run(
             count = len(rows.numbers)
             yield f"{title}: {total - count} of {total} rows; {count} others were run"
     try:
-        result = _program_outcome(program, text, rows.values)
+        engine = ENGINES[program.format]
+        result = engine(program.content, model, text.options, rows.values)
     except MissingExtraError:
         raise
     except (FuzzyTreeError, ValueError, LookupError) as error:
@@ -540,29 +539,6 @@ def _run(
         yield counted("rows", title, "the model", len(rows.numbers), faults)
         return
     yield from _compare_answers(subject, title, result, model, dtype, rows)
-
-
-def _program_outcome(
-    program: ProgramFile, text: _Text, values: FloatArray
-) -> ProgramOutcome:
-    """Return what a program answers; the numbers of a system as its results.
-
-    Raises:
-        MissingExtraError: If an engine is missing.
-        FuzzyTreeError: If the program fails.
-    """
-    if not text.form.outputs:
-        model = cast("Model", text.form)
-        return ENGINES[program.format](program.content, model, text.options, values)
-    system, count = cast("FuzzySystem", text.form), len(text.form.outputs)
-    numbers = system_numbers(
-        program.content, program.format, system, text.options, values
-    )
-    has_status = len(numbers) > count
-    status = numbers[count : count + 1] if has_status else np.zeros_like(numbers[:1])
-    parts = numbers[:count], numbers[count + 1 :], status
-    outcome = system_outcome(system, np.vstack(parts))
-    return ProgramOutcome(outcome, None, has_status)
 
 
 def _table_rows(model: Document, rows: RowSet) -> RowSet:

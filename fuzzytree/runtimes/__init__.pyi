@@ -28,7 +28,6 @@ from .python import load_content as load_content
 from .rows import Real as Real
 from .rows import axis_lines as axis_lines
 from .rows import plan_axes as plan_axes
-from .rows import system_outcome as system_outcome
 from .table import all_runtimes as all_runtimes
 from .table import baseline as baseline
 from .table import chosen_runtimes as chosen_runtimes
@@ -39,4 +38,3 @@ from .table import needed_by as needed_by
 from .written import ENGINES as ENGINES
 from .written import Options as Options
 from .written import ProgramOutcome as ProgramOutcome
-from .written import system_numbers as system_numbers

@@ -21,13 +21,12 @@ from fuzzytree.exporters import write_c
 from fuzzytree.model import (
     Document,
     FloatArray,
-    FuzzySystem,
     Model,
     Outcome,
     Run,
     Runtime,
 )
-from fuzzytree.runtimes.rows import checked, system_outcome
+from fuzzytree.runtimes.rows import checked
 from fuzzytree.runtimes.table import rules_only
 
 if TYPE_CHECKING:
@@ -47,49 +46,28 @@ _LONGEST_WAIT = 600.0  # seconds
 _LOOP = """
 #include <stddef.h>
 
-/* Answer many rows: x holds one line of `rows` values for each input. The strengths of
- * a row go to `fired`; where that is null, the winner alone is looked for. */
+/* Answer many rows: x holds one line of `rows` values for each input. The numbers of a
+ * row go to `made` first; where that is null, the winner alone is looked for. */
 extern void model_many(const model_real *x, size_t rows, int64_t *rule,
-    int64_t *status, model_real *fired, double *strengths)
+    int64_t *status, model_real *made, double *numbers)
 {
     model_real row[MODEL_INPUTS + 1];
     size_t place, line;
     for (place = 0; place < rows; place++) {
-        model_answer found;
         for (line = 0; line < MODEL_INPUTS; line++)
             row[line] = x[line * rows + place];
         FIND
-        rule[place] = found.rule;
-        status[place] = found.status;
+        for (line = 0; made && line < COUNT; line++)
+            numbers[line * rows + place] = (double)made[line];
     }
 }
 """
 
-_INFER_LOOP = """
-#include <stddef.h>
-
-extern void model_many(const model_real *x, size_t rows, double *outputs,
-    int64_t *status)
-{
-    model_real row[MODEL_INPUTS + 1], found[MODEL_OUTPUTS];
-    size_t place, line;
-    for (place = 0; place < rows; place++) {
-        for (line = 0; line < MODEL_INPUTS; line++)
-            row[line] = x[line * rows + place];
-        status[place] = model_infer(row, found);
-        for (line = 0; line < MODEL_OUTPUTS; line++)
-            outputs[line * rows + place] = (double)found[line];
-    }
-}
-"""
-
-_DECIDE = "(void)fired, (void)strengths, found = model_decide(row);"
-
-_EITHER = """\
-found = fired ? model_strengths(row, fired) : model_decide(row);
-        for (line = 0; fired && line < MODEL_RULES; line++)
-            strengths[line * rows + place] = (double)fired[line];
-"""
+_ANSWER = """{
+            model_answer found = ANSWER;
+            rule[place] = found.rule;
+            status[place] = found.status;
+        }"""
 
 
 def load(
@@ -104,10 +82,16 @@ def load(
         MissingExtraError: If no compiler is installed.
         FuzzyTreeError: If the compiler fails.
     """
-    if isinstance(model, FuzzySystem):
-        return _load_system(model, dtype, with_strengths=with_strengths)
+    is_system = bool(model.outputs)
     try:
-        written = write_c(model, dtype=dtype, name="model", selftest=False)
+        written = write_c(
+            model,
+            dtype=dtype,
+            name="model",
+            activations=is_system and with_strengths,
+            selftest=False,
+            tables=is_system,  # quicker where memory is no concern
+        )
     except LossError as error:
         text = str(error).replace("cannot write", "cannot run", 1)
         raise LossError(text.partition("\n  pass allow_loss")[0]) from error
@@ -116,7 +100,7 @@ def load(
 
 def load_content(
     content: bytes,
-    model: Model,
+    model: Document,
     dtype: Dtype = "float64",
     *,
     prefix: str = "model",
@@ -124,17 +108,23 @@ def load_content(
 ) -> Run:
     """Return the same for a file that `fuzzytree.exporters.c` wrote of a model.
 
-    `prefix` is the beginning of all names in the file.
+    `prefix` is the beginning of all names in the file, which gives the activations of a
+    system if `with_strengths`.
 
     Raises:
         MissingExtraError: As `load`.
         FuzzyTreeError: As `load`.
     """
-    find = _EITHER if model.rules else _DECIDE
-    loop = _LOOP.replace("FIND", find).replace("model_", f"{prefix}_")
-    loop = loop.replace("MODEL_", f"{prefix.upper()}_")
-    decide = compiled(content, loop, 4, function=f"{prefix}_many")
-    count = len(model.rules) if with_strengths else 0
+    count = len(model.outputs) + with_strengths * len(model.rules)
+    find = "status[place] = model_infer(row, made);"
+    if not model.outputs:
+        decide = "made ? model_strengths(row, made) : model_decide(row)"
+        decide = decide if model.rules else "model_decide(row)"
+        find = _ANSWER.replace("ANSWER", decide)
+    loop = _LOOP.replace("FIND", find).replace("COUNT", str(count))
+    loop = loop.replace("model_", f"{prefix}_").replace("MODEL_", f"{prefix.upper()}_")
+    is_long = bool(model.outputs) and len(content) > _LONG
+    answer = compiled(content, loop, 4, "-O0" if is_long else "-O2", f"{prefix}_many")
     real = np.dtype(dtype)
 
     def run(values: FloatArray) -> Outcome:
@@ -142,12 +132,17 @@ def load_content(
         with np.errstate(over="ignore"):  # what float32 cannot hold is missing
             inputs = np.ascontiguousarray(array, real)
         rows = array.shape[1]
-        rule, status = np.empty((2, rows), np.int64)
-        fired = np.empty(count, real) if count else None
-        strengths = np.empty((count, rows), np.float64) if count else None
-        filled = map(_at, (rule, status, fired, strengths))
-        decide(_at(inputs), rows, *filled)
-        return Outcome(rule, status, strengths)
+        rule, status = np.zeros((2, rows), np.int64)
+        made = np.empty(count, real) if count else None
+        numbers = np.empty((count, rows), np.float64)
+        answer(_at(inputs), rows, *map(_at, (rule, status, made, numbers)))
+        outputs, strengths = np.split(numbers, [len(model.outputs)])
+        return Outcome(
+            rule,
+            status,
+            strengths if len(strengths) else None,
+            outputs=outputs if model.outputs else None,
+        )
 
     return run
 
@@ -160,54 +155,6 @@ def load_best_first(model: Model, *, with_strengths: bool = False) -> Run:
     """
     rules = rules_only(model, "c best-first", "searches")
     return load(rules, with_strengths=False)
-
-
-def _load_system(system: FuzzySystem, dtype: Dtype, *, with_strengths: bool) -> Run:
-    """Return a function that answers rows of a fuzzy system by compiled C."""
-    file = write_c(
-        system,
-        dtype=dtype,
-        name="model",
-        activations=with_strengths,
-        selftest=False,
-        tables=True,  # quicker where memory is no concern
-    )
-    return load_system_content(
-        file.content, system, dtype, with_strengths=with_strengths
-    )
-
-
-def load_system_content(
-    content: bytes,
-    system: FuzzySystem,
-    dtype: Dtype = "float64",
-    *,
-    prefix: str = "model",
-    with_strengths: bool = True,
-) -> Run:
-    """Return the same for a file that `fuzzytree.exporters.c` wrote of a system.
-
-    `prefix` is the beginning of all names in the file, which gives activations if
-    `with_strengths`.
-
-    Raises:
-        MissingExtraError: As `load`.
-        FuzzyTreeError: As `load`.
-    """
-    speed = "-O0" if len(content) > _LONG else "-O2"
-    loop = _INFER_LOOP.replace("model_", f"{prefix}_")
-    loop = loop.replace("MODEL_", f"{prefix.upper()}_")
-    infer = compiled(content, loop, 2, speed, f"{prefix}_many")
-    count = len(system.outputs) + with_strengths * len(system.rules)
-
-    def run(values: FloatArray) -> Outcome:
-        inputs = np.ascontiguousarray(checked(values, system.inputs), dtype)
-        rows = inputs.shape[1]
-        numbers, status = np.empty((count, rows)), np.empty(rows, np.int64)
-        infer(_at(inputs), rows, _at(numbers), _at(status))
-        return system_outcome(system, np.vstack([numbers, status.astype(np.float64)]))
-
-    return run
 
 
 def _at(array: npt.NDArray[np.generic] | None) -> int | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.model import WEIGHT_OF_ONE, RuleBase, parts_of, squarings
+from fuzzytree.model import WEIGHT_OF_ONE, Model, parts_of, squarings
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray, IntArray
@@ -20,7 +20,7 @@ _CHUNK = 1 << 14  # rows
 
 
 def class_probabilities(
-    rules: RuleBase, strengths: FloatArray, winner: IntArray
+    rules: Model, strengths: FloatArray, winner: IntArray
 ) -> FloatArray | None:
     """Return the probability of each class for each row.
 
@@ -37,7 +37,7 @@ def class_probabilities(
         return None
     parts = np.array([parts_of(r.probabilities) for r in rules.rules], np.float64).T
     codes = {name: code for code, name in enumerate(rules.classes)}
-    owners = np.array([0, *(codes[rule.then] for rule in rules.rules)], np.int64)
+    owners = np.array([0, *(codes[label] for label in rules.rule_labels)], np.int64)
     result = np.full((len(rules.classes), strengths.shape[1]), np.nan)
     for start in range(0, len(winner), _CHUNK):
         rows = start + np.flatnonzero(winner[start : start + _CHUNK])

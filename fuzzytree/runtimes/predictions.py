@@ -325,7 +325,7 @@ def predictions_of(
     ):
         codes[outcome.status == status] = -1 if answer is None else position[answer]
     probabilities = outcome.probabilities
-    if with_probabilities and isinstance(model, RuleBase) and probabilities is None:
+    if with_probabilities and model.rules and probabilities is None:
         assert outcome.strengths is not None  # `prepare_answering` requests them
         probabilities = class_probabilities(model, outcome.strengths, outcome.rule)
     return Predictions(

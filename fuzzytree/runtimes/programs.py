@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.model import FuzzySystem, Outcome, Run, checkpoint
-from fuzzytree.runtimes.rows import checked, system_outcome
+from fuzzytree.runtimes.rows import checked
 from fuzzytree.semantics import (
     ARRAYS,
     Program,
@@ -204,6 +204,9 @@ def run_system(system: FuzzySystem, /, *, with_strengths: bool = True) -> Run:
 
     def run(values: FloatArray) -> Outcome:
         numbers = run_program(plan, checked(values, system.inputs))
-        return system_outcome(system, numbers)
+        outputs, strengths = np.split(numbers[:-1], [len(system.outputs)])
+        status = numbers[-1].astype(np.int64)
+        fired = strengths if with_strengths else None
+        return Outcome(np.zeros_like(status), status, fired, outputs=outputs)
 
     return run

@@ -9,18 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-
 from fuzzytree.exporters import write_python
-from fuzzytree.model import (
-    Document,
-    FloatArray,
-    FuzzySystem,
-    Outcome,
-    Run,
-    Runtime,
-)
-from fuzzytree.runtimes.rows import checked, outcome_of, system_outcome
+from fuzzytree.model import Document, FloatArray, Outcome, Run, Runtime
+from fuzzytree.runtimes.rows import checked, outcome_of
 
 
 def load(model: Document, *, with_strengths: bool = True) -> Run:
@@ -33,12 +24,11 @@ def load_content(content: bytes, model: Document) -> Run:
     answer = _answer_of(content)
 
     def run(values: FloatArray) -> Outcome:
-        answers = map(answer, checked(values, model.inputs).T.tolist())
-        if isinstance(model, FuzzySystem):
-            lines = [(*outputs, *rest[0], status) for outputs, status, *rest in answers]
-            width = len(model.outputs) + len(model.rules) + 1
-            return system_outcome(model, np.array(lines).reshape(-1, width).T)
-        rows = [[*row[1:3], *(row[3] if len(row) == 4 else ())] for row in answers]
+        rows: list[list[float]] = []
+        for row in checked(values, model.inputs).T.tolist():
+            first, status, *rest = answer(row) if model.outputs else answer(row)[1:]
+            ends = first if model.outputs else [first]
+            rows.append([*ends, status, *(number for part in rest for number in part)])
         return outcome_of(model, rows)
 
     return run

@@ -2,20 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from fuzzytree.model import (
-    Document,
-    FloatArray,
-    FuzzySystem,
-    FuzzyTree,
-    Outcome,
-    RuleBase,
-    Run,
-    Runtime,
-)
-from fuzzytree.runtimes.rows import checked, outcome_of, system_outcome
-from fuzzytree.semantics import Answer, descend, evaluate, infer
+from fuzzytree.model import Document, FloatArray, Outcome, Run, Runtime
+from fuzzytree.runtimes.rows import checked, outcome_of
+from fuzzytree.semantics import answer_of
 
 
 def load(model: Document, *, with_strengths: bool = True) -> Run:
@@ -23,20 +12,12 @@ def load(model: Document, *, with_strengths: bool = True) -> Run:
 
     def run(values: FloatArray) -> Outcome:
         table = checked(values, model.inputs).T.tolist()
-        rows = [dict(zip(model.inputs, row, strict=True)) for row in table]
-        answers: list[Answer]
-        match model:
-            case FuzzySystem():
-                inferred = [infer(model, row) for row in rows]
-                lines = [(*r.outputs, *r.activations, r.status) for r in inferred]
-                width = len(model.outputs) + len(model.rules) + 1
-                numbers = np.array(lines, np.float64).reshape(len(rows), width).T
-                return system_outcome(model, numbers)
-            case RuleBase():
-                answers = [evaluate(model, row) for row in rows]
-            case FuzzyTree():
-                answers = [descend(model, row) for row in rows]
-        return outcome_of(model, [[a.rule, a.status, *a.strengths] for a in answers])
+        rows = (dict(zip(model.inputs, row, strict=True)) for row in table)
+        answers = [answer_of(model, row) for row in rows]
+        return outcome_of(
+            model,
+            [[*(a.outputs or [a.rule]), a.status, *a.strengths] for a in answers],
+        )
 
     return run
 

@@ -16,8 +16,7 @@ import numpy as np
 
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.model import (
-    FuzzySystem,
-    Model,
+    Document,
     Outcome,
     Variable,
     stand_ins,
@@ -80,50 +79,40 @@ def winners(
 
 
 def outcome_of(
-    model: Model,
+    model: Document,
     rows: Sequence[Sequence[float | None]],
     *,
     has_probabilities: bool = False,
 ) -> Outcome:
-    """Return rows of a rule, a status and any strengths, None for NaN, as an outcome.
+    """Return rows of numbers, None for NaN, as an outcome.
 
-    The probabilities of all classes may stand behind them.
+    A row is a rule, or the outputs of a system; a status; any strengths; and the
+    probabilities of all classes if there are some.
 
     Raises:
         FuzzyTreeError: If there are more or fewer strengths than rules.
     """
-    count = len(model.rules)
+    first, count = len(model.outputs) or 1, len(model.rules)
     rated = len(model.classes) if has_probabilities else 0
-    width = len(rows[0]) if rows else 2 + count + rated
+    width = len(rows[0]) if rows else first + 1 + count + rated
     whole = np.array(rows, np.float64).reshape(len(rows), width)
-    table, probabilities = whole[:, : width - rated], whole[:, width - rated :].T
-    if table.shape[1] not in (2, 2 + count):
-        raise FuzzyTreeError(f"it gives {table.shape[1] - 2} strengths, not {count}")
-    strengths = table[:, 2:].T if table.shape[1] > 2 else None
+    table, probabilities = whole[:, : width - rated].T, whole[:, width - rated :].T
+    if len(table) - first - 1 not in (0, count):
+        raise FuzzyTreeError(
+            f"it gives {len(table) - first - 1} strengths, not {count}"
+        )
+    outputs, strengths = table[:first], table[first + 1 :]
+    rule = np.zeros_like(outputs[0]) if model.outputs else outputs[0]
     last = len(model.rule_labels)
-    for what, numbers, most in (
-        ("rule", table[:, 0], last),
-        ("status", table[:, 1], 3),
-    ):
+    for what, numbers, most in (("rule", rule, last), ("status", table[first], 3)):
         if not np.isin(numbers, np.arange(most + 1)).all():
             raise FuzzyTreeError(f"it answers a {what} that is none of 0 to {most}")
-    rule, status = table[:, :2].T.astype(np.int64)
-    return Outcome(rule, status, strengths, probabilities if rated else None)
-
-
-def system_outcome(system: FuzzySystem, numbers: FloatArray) -> Outcome:
-    """Return the numbers of a fuzzy system as an outcome.
-
-    They have the order of the results of its program: outputs, activations of the rules
-    or none, status; shape (numbers, rows).
-    """
-    outputs, strengths = np.split(numbers[:-1], [len(system.outputs)])
-    status = numbers[-1].astype(np.int64)
     return Outcome(
-        np.zeros_like(status),
-        status,
-        strengths if len(strengths) == len(system.rules) else None,
-        outputs=outputs,
+        rule.astype(np.int64),
+        table[first].astype(np.int64),
+        strengths if len(strengths) else None,
+        probabilities if rated else None,
+        outputs if model.outputs else None,
     )
 
 

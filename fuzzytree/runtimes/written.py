@@ -28,8 +28,6 @@ from fuzzytree.exporters import beginning
 from fuzzytree.model import (
     Document,
     FloatArray,
-    FuzzySystem,
-    Model,
     Option,
     Outcome,
     Variable,
@@ -47,8 +45,8 @@ class ProgramOutcome(NamedTuple):
     """What a program answered.
 
     Attributes:
-        outcome: Rules, statuses and strengths.
-        labels: The classes; None if the program gives only their places.
+        outcome: Rules or outputs, statuses and strengths.
+        labels: The classes; None if the program gives only their places, or numbers.
         has_status: Whether the statuses are the program's own.
     """
 
@@ -57,7 +55,7 @@ class ProgramOutcome(NamedTuple):
     has_status: bool = True
 
 
-Engine = Callable[[bytes, Model, Options, "FloatArray"], ProgramOutcome]
+Engine = Callable[[bytes, Document, Options, "FloatArray"], ProgramOutcome]
 
 _PYTHON = """
 import array, json, runpy
@@ -145,11 +143,13 @@ def numbers_of(
 
 def _script(language: str) -> Engine:
     def run(
-        content: bytes, model: Model, options: Options, values: FloatArray
+        content: bytes, model: Document, options: Options, values: FloatArray
     ) -> ProgramOutcome:
-        result = numbers_of(content, language, values, model.classes)
-        labels = tuple(None if k < 0 else model.classes[int(k)] for k in result[:, 0])
-        rows = result[:, 1:].tolist()
+        rows = numbers_of(content, language, values, model.classes).tolist()
+        if model.outputs:
+            return ProgramOutcome(outcome_of(model, rows), None)
+        labels = tuple(None if k < 0 else model.classes[int(k)] for k, *_ in rows)
+        rows = [row[1:] for row in rows]
         outcome = outcome_of(model, rows, has_probabilities=_is_rated(options))
         return ProgramOutcome(outcome, labels)
 
@@ -165,23 +165,25 @@ def _c_type(options: Options) -> c.Dtype:
 
 
 def _c(
-    content: bytes, model: Model, options: Options, values: FloatArray
+    content: bytes, model: Document, options: Options, values: FloatArray
 ) -> ProgramOutcome:
     dtype, name = _c_type(options), cast("str | None", options.get("name"))
-    run = c.load_content(content, model, dtype, prefix=beginning(model.name, name))
+    is_fired = not model.outputs or options.get("activations") is True
+    prefix = beginning(model.name, name)
+    run = c.load_content(content, model, dtype, prefix=prefix, with_strengths=is_fired)
     return ProgramOutcome(run(values), None)
 
 
 def _sql(
-    content: bytes, model: Model, options: Options, values: FloatArray
+    content: bytes, model: Document, options: Options, values: FloatArray
 ) -> ProgramOutcome:
-    labels: list[str | None] = []
-    rows: list[Sequence[Any]] = []
-    for label, *numbers in _queried(content, model, options, values):
-        labels.append(label)
-        rows.append(numbers)
+    rows = _queried(content, model, options, values)
+    if model.outputs:
+        return ProgramOutcome(outcome_of(model, rows), None)
+    labels = tuple(label for label, *_ in rows)
+    rows = [numbers for _, *numbers in rows]
     outcome = outcome_of(model, rows, has_probabilities=_is_rated(options))
-    return ProgramOutcome(outcome, tuple(labels))
+    return ProgramOutcome(outcome, labels)
 
 
 def _queried(
@@ -273,9 +275,14 @@ def _evaluated(content: bytes, model: Document, values: FloatArray) -> Any:
 
 
 def _pmml(
-    content: bytes, model: Model, options: Options, values: FloatArray
+    content: bytes, model: Document, options: Options, values: FloatArray
 ) -> ProgramOutcome:
     result = _evaluated(content, model, values)
+    if model.outputs:
+        table = result[[one.name for one in model.outputs]]
+        rows = table.to_numpy(dtype=np.float64, na_value=np.nan).tolist()
+        outcome = outcome_of(model, [[*row, Status.DECIDED] for row in rows])
+        return ProgramOutcome(outcome, None, has_status=False)
     labels = tuple(None if one != one else one for one in result["answer"])
     names = [f"strength of rule {k}" for k in range(1, len(model.rules) + 1)]
     is_rated = _is_rated(options)
@@ -301,55 +308,6 @@ def _need(package: str, purpose: str) -> None:
     if importlib.util.find_spec(package) is None:
         text = f"{purpose} needs the package {package!r}, which is not installed"
         raise MissingExtraError(text)
-
-
-def system_numbers(
-    content: bytes,
-    form: str,
-    system: FuzzySystem,
-    options: Options,
-    values: FloatArray,
-) -> FloatArray:
-    """Run the program of a fuzzy system by an engine of its language.
-
-    Args:
-        content: The file.
-        form: The name of its format: `c`, `python`, `javascript`, `sql` or `pmml`.
-        system: What it was written of.
-        options: The options that it was written with.
-        values: Shape (inputs, rows).
-
-    Returns:
-        Shape (results, rows): the outputs, the status, and the activations if the
-        program gives them; of PMML, which has no status, the outputs alone.
-
-    Raises:
-        MissingExtraError: If the engine is not installed.
-        FuzzyTreeError: If the program fails.
-        KeyError: If there is no engine for the format.
-    """
-    outputs = [one.name for one in system.outputs]
-    match form:
-        case "python" | "javascript":
-            return numbers_of(content, form, values, ()).T
-        case "c":
-            is_fired = options.get("activations") is True
-            prefix = beginning(system.name, cast("str | None", options.get("name")))
-            dtype = _c_type(options)
-            run = c.load_system_content(
-                content, system, dtype, prefix=prefix, with_strengths=is_fired
-            )
-            outcome = run(values)
-            status = outcome.status.reshape(1, -1).astype(np.float64)
-            parts = outcome.outputs, status, outcome.strengths
-            return np.vstack([part for part in parts if part is not None])
-        case "sql":
-            return np.array(_queried(content, system, options, values), np.float64).T
-        case "pmml":
-            table = _evaluated(content, system, values)[outputs]
-            return np.asarray(table.to_numpy(dtype=np.float64, na_value=np.nan)).T
-        case _:
-            raise KeyError(form)
 
 
 ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(

@@ -39,6 +39,7 @@ from .enclosing import Interval as Interval
 from .enclosing import Jet as Jet
 from .enclosing import degree_bounds as degree_bounds
 from .enclosing import jet as jet
+from .inference import answer_of as answer_of
 from .inference import infer as infer
 from .inference import unsampled_terms as unsampled_terms
 from .inference.degrees import curve_degree as curve_degree

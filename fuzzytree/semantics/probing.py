@@ -27,7 +27,6 @@ from fuzzytree.model import (
     FloatArray,
     Formula,
     FuzzySystem,
-    FuzzyTree,
     Gaussian,
     Hedge,
     Linear,
@@ -75,13 +74,12 @@ Row = dict[str, float]
 Interval = tuple[float, float]
 
 
-def probes(
-    model: FuzzyTree | RuleBase, *, limit: int = 20_000, seed: int = 0
-) -> list[Row]:
+def probes(model: Document, *, limit: int = 20_000, seed: int = 0) -> list[Row]:
     """Return rows that put each distinct proposition on its landmarks and beside them.
 
     Args:
-        model: A rule base, or a tree, which is probed through its relative rules.
+        model: A rule base, or a tree, which is probed through its relative rules; of a
+            system the rows are those of `system_probes`.
         limit: The most rows to return. Above it, propositions' landmarks are drawn from
             the seed; random rows and special values always keep their place.
         seed: The same model, limit and seed give the same rows.
@@ -91,6 +89,8 @@ def probes(
         then each of `SPECIAL` in each input.
     """
     rules = rules_of(model)
+    if isinstance(rules, FuzzySystem):
+        return system_probes(rules, limit=limit, seed=seed)
     chance = random.Random(seed)
     maker = _Maker(rules, chance)
     tail = [maker.draw() for _ in range(_RANDOM_ROWS)]
@@ -103,11 +103,11 @@ def probes(
     return [maker.meet(*target) for target in targets] + tail
 
 
-def few_probes(model: FuzzyTree | RuleBase, limit: int) -> list[Row]:
+def few_probes(model: Document, limit: int) -> list[Row]:
     """Return a few rows of every kind that `probes` returns, for tests within files.
 
     Args:
-        model: A rule base or a tree.
+        model: The model; of a system the rows are those of `probes`.
         limit: The most rows: half of them on landmarks, an eighth random ones, the
             rest with special values. `probes` itself keeps its random rows first.
 
@@ -116,6 +116,8 @@ def few_probes(model: FuzzyTree | RuleBase, limit: int) -> list[Row]:
         >>> len(few_probes(random_tree(1), 64))
         64
     """
+    if model.outputs:
+        return probes(model, limit=limit)
     special = len(SPECIAL) * len(model.inputs)
     rows = probes(model, limit=_RANDOM_ROWS + special + 10 * limit)
     last = len(rows) - special
@@ -134,11 +136,10 @@ def _spread(rows: Sequence[Row], count: int) -> list[Row]:
 
 
 def probe_values(model: Document, limit: int, *, seed: int = 0) -> FloatArray:
-    """Return the rows of `probes`, of a system `system_probes`, as (inputs, rows)."""
+    """Return the rows of `probes` as (inputs, rows)."""
     import numpy as np
 
-    make = system_probes if model.outputs else probes
-    rows = make(model, limit=limit, seed=seed)  # type: ignore[arg-type] # as chosen
+    rows = probes(model, limit=limit, seed=seed)
     table = np.array([[row[n] for row in rows] for n in model.inputs], np.float64)
     return table.reshape(len(model.inputs), len(rows))
 

@@ -45,20 +45,22 @@ class Status(IntEnum):
 
 
 class Answer(msgspec.Struct, frozen=True):
-    """What a rule base or a tree says about one row.
+    """What a model says about one row.
 
     Attributes:
         rule: The number of the winning rule or leaf, from 1; 0 if there is none.
         label: The class, or None for "no class".
         status: Decided, decided by order among equals, uncovered, or missing.
-        strengths: Of every rule, in order; NaN where a needed value is missing.
-            Empty for a tree.
+        strengths: Of every rule, in order, of a system its activation; NaN where a
+            needed value is missing. Empty for a tree.
+        outputs: The numbers of a system.
     """
 
     rule: int
     label: str | None
     status: Status
     strengths: tuple[float, ...] = ()
+    outputs: tuple[float, ...] = ()
 
 
 def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:

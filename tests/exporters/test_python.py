@@ -102,7 +102,7 @@ def test_systems_have_the_bits_of_the_reference(
             outputs, status, activations = answer([row[n] for n in system.inputs])
             assert status == right.status
             given = np.array([*outputs, *activations])
-            wanted = np.array([*right.outputs, *right.activations])
+            wanted = np.array([*right.outputs, *right.strengths])
             assert same_bits(given, wanted).all(), seed
 
 

@@ -39,7 +39,7 @@ def test_the_example_is_a_whole_file_that_comes_back() -> None:
     # against 0.1 of none.
     minutes, soap = found.outputs
     assert 80.0 < minutes < 95.0
-    weight = found.activations[1]
+    weight = found.strengths[1]
     assert abs(soap - weight * (180.0 + minutes - 30.0) / (weight + 0.1)) < 1e-9
 
 

@@ -246,7 +246,7 @@ def test_a_mamdani_file_of_the_standard_answers_alike_in_pyit2fls(
     count = 0
     for row in random_rows(system, 5, 40):
         ours = infer(alike, row)
-        is_covered = ours.outputs != (0.0,) and max(ours.activations) > 0.0
+        is_covered = ours.outputs != (0.0,) and max(ours.strengths) > 0.0
         ends = zip(system.variables, row.values(), strict=True)
         if not is_covered or not all(_is_within(one, x) for one, x in ends):
             continue

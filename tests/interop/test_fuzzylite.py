@@ -328,7 +328,7 @@ def is_sure(system: FuzzySystem, row: Row) -> bool:
     found = infer(system, row)
     methods = {one.defuzzifier.method for one in system.outputs}
     is_smooth = methods <= {"centroid", "weighted average", "weighted sum"}
-    return is_smooth and all(one <= 1.0 for one in found.activations)
+    return is_smooth and all(one <= 1.0 for one in found.strengths)
 
 
 @pytest.mark.heavy

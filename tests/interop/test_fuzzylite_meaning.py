@@ -102,7 +102,7 @@ def _block(block: RuleBlock) -> RuleBlock:
 def _has_ties(system: FuzzySystem, row: Mapping[str, float]) -> bool:
     """Return whether rules of one degree compete, which a heap there orders."""
     every = tuple(replace(one, activation=Activation()) for one in system.blocks)
-    degrees = iter(infer(replace(system, blocks=every), row).activations)
+    degrees = iter(infer(replace(system, blocks=every), row).strengths)
     for block in system.blocks:
         own = itertools.islice(degrees, len(block.rules))
         fired = [degree for degree in own if degree > 0.0]
@@ -133,7 +133,7 @@ def test_random_systems_answer_as_fuzzylite_6(
         systems += 1
         for row, expected in zip(rows, answers.outputs, strict=True):
             found = infer(system, row)
-            if any(0.0 < degree < _WEAK for degree in found.activations):
+            if any(0.0 < degree < _WEAK for degree in found.strengths):
                 continue
             if _has_ties(system, row):
                 continue

@@ -179,7 +179,7 @@ def test_node_has_the_numbers_of_every_system_within_derived_bounds(
         bounds = error_bounds(kept, values)[order].T
         right = [infer(system, row) for row in rows]
         wanted = np.array(
-            [[*one.outputs, int(one.status), *one.activations] for one in right]
+            [[*one.outputs, int(one.status), *one.strengths] for one in right]
         )
         is_exact = bounds == 0.0
         exact += int(is_exact.sum())

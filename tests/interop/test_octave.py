@@ -165,7 +165,7 @@ def test_random_systems_answer_alike_in_fuzzylite(
         kinds.add(system.outputs[0].defuzzifier.is_weighted)
         for row, usual, theirs in zip(rows, run.outputs, nearly, strict=True):
             inference = infer(system, dict(zip(system.inputs, row, strict=True)))
-            if any(0.0 < one < WEAK for one in inference.activations):
+            if any(0.0 < one < WEAK for one in inference.strengths):
                 continue
             sizes = [1.0, *(x for x in map(abs, inference.outputs) if x == x)]
             difference = largest_difference([inference.outputs], [theirs])

@@ -10,7 +10,7 @@ import pytest
 
 from fuzzytree.exporters import find_format
 from fuzzytree.runtimes.programs import run_system
-from fuzzytree.runtimes.written import system_numbers
+from fuzzytree.runtimes.written import ENGINES as RUNNERS
 from fuzzytree.semantics.probing import system_probes
 from fuzzytree.semantics.programs.bounds import error_bounds
 from fuzzytree.semantics.programs.system_program import from_system
@@ -73,7 +73,10 @@ def test_programs_have_the_numbers_of_the_native_runtime(engine: str) -> None:
         system = random_system(seed, formulas="wild" if seed % 4 == 3 else "tame")
         values = values_of(system, 60)
         content = find_format(form).write(system, **options).content
-        numbers = system_numbers(content, form, system, options, values)
+        result = RUNNERS[form](content, system, options, values).outcome
+        status = result.status[np.newaxis].astype(np.float64)
+        parts = result.outputs, status, result.strengths
+        numbers = np.vstack([part for part in parts if part is not None])
         exact += within(system, values, numbers)
     assert exact > 9_000
 
@@ -85,12 +88,8 @@ def test_pmml_gives_the_outputs() -> None:
     system = random_system(3)
     values = values_of(system, 40)
     content = find_format("pmml").write(system).content
-    outputs = system_numbers(content, "pmml", system, {}, values)
+    outputs = RUNNERS["pmml"](content, system, {}, values).outcome.outputs
+    assert outputs is not None
     right = run_system(system)(values).outputs
     assert right is not None
     np.testing.assert_allclose(outputs, right, rtol=1e-13, equal_nan=True)
-
-
-def test_an_unknown_format_has_no_engine() -> None:
-    with pytest.raises(KeyError, match="fll"):
-        system_numbers(b"", "fll", random_system(0), {}, np.zeros((3, 1)))

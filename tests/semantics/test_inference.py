@@ -382,7 +382,7 @@ A_UP, A_DOWN, B_UP = (
 )
 def test_a_condition_joins_degrees(when: Condition, expected: float) -> None:
     found = infer(system([rule(when)]), {"a": 0.25, "b": 0.5})
-    assert found.activations == (expected,)
+    assert found.strengths == (expected,)
     assert found.outputs == (expected,)
     assert found.status == Status.DECIDED
 
@@ -397,13 +397,13 @@ def test_three_parts_are_joined_from_left_to_right() -> None:
     either = s_norm("hamacher sum", degrees[0], degrees[1])
     any_of_three = s_norm("hamacher sum", either, degrees[2])
     found = infer(system([rule(And(when)), rule(Or(when))], block=block), row)
-    assert found.activations == (all_three, any_of_three)
+    assert found.strengths == (all_three, any_of_three)
 
 
 def test_a_weight_multiplies_the_degree_and_a_rule_of_weight_0_never_fires() -> None:
     rules = [rule(B_UP, weight=0.5), rule(B_UP, weight=0.0)]
     found = infer(system(rules), {"a": 0.25, "b": 0.5})
-    assert found.activations == (0.25, 0.0)
+    assert found.strengths == (0.25, 0.0)
     assert found.outputs == (0.25,)
 
 
@@ -411,7 +411,7 @@ def test_a_height_multiplies_the_degree() -> None:
     low = replace(system([rule(A_UP)]), variables=(
         Variable("a", (replace(UP, height=0.5),)), Variable("b", (UP, DOWN)),
     ))  # fmt: skip
-    assert infer(low, {"a": 0.5, "b": 0.0}).activations == (0.25,)
+    assert infer(low, {"a": 0.5, "b": 0.0}).strengths == (0.25,)
 
 
 LABELS = (
@@ -520,7 +520,7 @@ def test_where_nothing_is_concluded_the_default_answers(
             {"a": -1.0, "b": 0.0},
         )
         assert found.outputs[0] == pytest.approx(expected, nan_ok=True)
-        assert found.activations == (0.0,)
+        assert found.strengths == (0.0,)
         assert found.status == Status.UNCOVERED
 
 
@@ -529,7 +529,7 @@ def test_a_curve_without_area_answers_the_default_too() -> None:
     subject = system([rule(None)], labels, "centroid", aggregation="sum", default=9.0)
     found = infer(subject, {"a": 0.0, "b": 0.0})
     assert (found.outputs, found.status) == ((9.0,), Status.UNCOVERED)
-    assert found.activations == (1.0,)
+    assert found.strengths == (1.0,)
 
 
 def test_implication_cuts_and_aggregation_joins() -> None:
@@ -551,13 +551,13 @@ def test_hedges_of_a_conclusion_act_on_those_behind_it() -> None:
     then = (Conclusion("y", "one", ("very",)), Conclusion("y", "three", ("not",)))
     found = infer(system([SystemRule(A_UP, then)], LABELS), {"a": 0.5, "b": 0.0})
     assert found.outputs == (0.25 * 1.0 + 0.75 * 3.0,)
-    assert found.activations == (0.5,)
+    assert found.strengths == (0.5,)
 
 
 def test_a_conclusion_that_its_hedge_takes_to_0_concludes_nothing() -> None:
     then = (Conclusion("y", "one", ("not",)),)
     found = infer(system([SystemRule(None, then)], default=4.0), {"a": 0.5, "b": 0.0})
-    assert (found.outputs, found.activations) == ((4.0,), (1.0,))
+    assert (found.outputs, found.strengths) == ((4.0,), (1.0,))
     assert found.status == Status.UNCOVERED
 
 
@@ -602,7 +602,7 @@ def test_an_activation_chooses_rules(
 ) -> None:
     block = RuleBlock((), activation=how)
     found = infer(system(FOUR, block=block), {"a": 0.25, "b": 0.75})
-    assert found.activations == expected
+    assert found.strengths == expected
     assert found.outputs[0] == pytest.approx(sum(expected), rel=1e-15)
 
 
@@ -628,7 +628,7 @@ def test_a_rule_may_ask_what_earlier_rules_concluded(
     ]
     block = RuleBlock((), activation=Activation(method, 9))
     found = infer(system(rules, LABELS, block=block), {"a": 0.25, "b": 0.0})
-    assert found.activations == expected
+    assert found.strengths == expected
 
 
 @pytest.mark.parametrize(
@@ -640,7 +640,7 @@ def test_a_later_block_asks_for_the_joined_degrees_of_a_label(
     first = system([rule(A_UP), rule(B_UP)], LABELS, aggregation=aggregation)
     later = RuleBlock((rule(ECHO, "three"),), activation=Activation("highest"))
     found = infer(replace(first, blocks=(*first.blocks, later)), {"a": 0.25, "b": 0.5})
-    assert found.activations == (0.25, 0.5, expected)
+    assert found.strengths == (0.25, 0.5, expected)
 
 
 def test_a_formula_sees_inputs_and_earlier_outputs() -> None:
@@ -701,7 +701,7 @@ def test_a_row_without_a_value_makes_everything_nan(value: float) -> None:
     subject = replace(subject, variables=(subject.variables[0], clamped))
     found = infer(subject, {"a": 0.5, "b": value})
     assert math.isnan(found.outputs[0])
-    assert math.isnan(found.activations[0])
+    assert math.isnan(found.strengths[0])
     assert found.status == Status.MISSING
 
 
@@ -726,7 +726,7 @@ def test_a_degree_that_is_nan_activates_nothing() -> None:
         root, Variable("b", (UP,)),
     ))  # fmt: skip
     found = infer(subject, {"a": -1.0, "b": 0.5})
-    assert found.activations == (0.0, 0.5)
+    assert found.strengths == (0.0, 0.5)
     assert found.outputs == (0.5,)
 
 
@@ -743,7 +743,7 @@ def test_nothing_fails_on_any_system_and_any_row(seed: int) -> None:
     for row in rows:
         found = infer(subject, row)
         assert len(found.outputs) == len(subject.outputs)
-        assert len(found.activations) == len(subject.rules)
+        assert len(found.strengths) == len(subject.rules)
         assert repr(infer(subject, row)) == repr(found)
 
 
@@ -778,7 +778,7 @@ def test_a_rule_that_was_not_chosen_concludes_nothing_under_a_hedge() -> None:
     for method in ("lowest", "first"):
         block = RuleBlock((), activation=Activation(method))
         found = infer(system(rules, LABELS, block=block), {"a": 0.25, "b": 0.0})
-        assert found.activations == (0.25, 0.0)
+        assert found.strengths == (0.25, 0.0)
         assert found.outputs == (0.25,)
 
 
@@ -797,7 +797,7 @@ def test_degrees_above_1_are_bounded_by_the_aggregation_that_joins_them() -> Non
     rules = [rule(Or((A_DOWN, B_UP))), rule(ECHO, "three")]
     subject = system(rules, LABELS, aggregation="bounded sum", block=block)
     found = infer(subject, {"a": 0.25, "b": 0.75})
-    assert found.activations == (1.5, 1.0)
+    assert found.strengths == (1.5, 1.0)
     assert found.outputs == (1.0 * 1.0 + 1.0 * 3.0,)
 
 
@@ -820,7 +820,7 @@ def test_a_combination_is_of_values_within_their_ranges() -> None:
     block = RuleBlock((rule(Proposition("mix", ("up",))),))
     subject = replace(subject, blocks=(block,))
     found = infer(subject, {"a": 9.0, "b": 0.125})
-    assert found.activations == (2.0 * (0.5 - 0.25) + 0.125,)
+    assert found.strengths == (2.0 * (0.5 - 0.25) + 0.125,)
 
 
 def test_a_degree_of_an_input_is_computed_once_for_a_row(

@@ -25,12 +25,15 @@ from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
+    Document,
     Formula,
     FuzzySystem,
+    FuzzyTree,
     Linear,
     Not,
     Or,
     Proposition,
+    RuleBase,
     RuleBlock,
     Singleton,
     SNorm,
@@ -51,11 +54,11 @@ from fuzzytree.semantics.inference.degrees import (
 )
 from fuzzytree.semantics.programs.activations import passes
 from fuzzytree.semantics.programs.operations import DOUBLES, divide, maximum, total
-from fuzzytree.semantics.reference import Status
+from fuzzytree.semantics.reference import Answer, Status, descend, evaluate
 
 __all__ = [
     "FUNCTIONS",
-    "Inference",
+    "answer_of",
     "curve_degree",
     "hedged",
     "infer",
@@ -67,26 +70,15 @@ __all__ = [
 ]
 
 
-class Inference(msgspec.Struct, frozen=True):
-    """What a system says about one row.
-
-    Attributes:
-        outputs: The number of each output, in order.
-        activations: Of each rule of all blocks, in order: the degree of its condition
-            times its weight (divided by the block's sum where the method is
-            `proportional`) if it was activated, else 0. NaN where a value is missing.
-        status: DECIDED; UNCOVERED if an output has no number of its own and its
-            default (or NaN) answers; MISSING if a value of the row, or a combination
-            of values, is not finite: then everything is NaN.
-    """
-
-    outputs: tuple[float, ...]
-    activations: tuple[float, ...]
-    status: Status
-
-
-def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
+def infer(system: FuzzySystem, row: Mapping[str, float]) -> Answer:
     """Run every block on one row, then defuzzify every output.
+
+    Returns:
+        The outputs, and as strengths the activation of each rule of all blocks: the
+        degree of its condition times its weight (divided by the block's sum where the
+        method is `proportional`) if it was activated, else 0. UNCOVERED if an output
+        has no number of its own and its default (or NaN) answers; MISSING if a value
+        of the row, or a combination of values, is not finite: then all is NaN.
 
     Raises:
         KeyError: If a column has no value.
@@ -110,7 +102,7 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
     count = len(system.rules)
     if not all(map(math.isfinite, values.values())):
         nothing = (math.nan,) * len(system.outputs)
-        return Inference(nothing, (math.nan,) * count, Status.MISSING)
+        return Answer(0, None, Status.MISSING, (math.nan,) * count, nothing)
     run = _Run(system, values)
     for block in system.blocks:
         run.activate(block)
@@ -118,11 +110,33 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
     for output in system.outputs:
         numbers.append(run.number(output))
         values[output.name] = answer(output, numbers[-1])
-    return Inference(
-        tuple(values[output.name] for output in system.outputs),
-        tuple(run.activations),
-        Status.UNCOVERED if any(map(math.isnan, numbers)) else Status.DECIDED,
-    )
+    status = Status.UNCOVERED if any(map(math.isnan, numbers)) else Status.DECIDED
+    outputs = tuple(values[output.name] for output in system.outputs)
+    return Answer(0, None, status, tuple(run.activations), outputs)
+
+
+def answer_of(model: Document, row: Mapping[str, float]) -> Answer:
+    """Return what the definition of any model answers to one row.
+
+    Raises:
+        KeyError: If an input has no value.
+
+    Example:
+        >>> from fuzzytree.testing import random_system, random_tree
+        >>> model = random_tree(0)
+        >>> answer_of(model, dict.fromkeys(model.inputs, 0.0)).rule > 0
+        True
+        >>> model = random_system(2)
+        >>> len(answer_of(model, dict.fromkeys(model.inputs, 0.0)).outputs)
+        2
+    """
+    match model:
+        case FuzzyTree():
+            return descend(model, row)
+        case RuleBase():
+            return evaluate(model, row)
+        case FuzzySystem():
+            return infer(model, row)
 
 
 def input_values(

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import IntEnum
 
-from fuzzytree.exporters import answer_of
 from fuzzytree.model import Model, Value
-from fuzzytree.semantics import Status
+from fuzzytree.semantics import Status, answer_of
 from fuzzytree.semantics import evaluate_program as run
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.sensor import Cells, pressed

@@ -87,7 +87,7 @@ def _strengths(
     system: FuzzySystem, seen: AuditView, row: Mapping[str, float]
 ) -> list[float]:
     """Return the true strength of each rule of a view; a way has its rule's."""
-    found = infer(system, row).activations
+    found = infer(system, row).strengths
     return [found[number - 1] for number in seen.numbers]
 
 

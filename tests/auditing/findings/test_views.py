@@ -82,7 +82,7 @@ def reasons(found: AuditView) -> list[str]:
 
 
 def activations(system: FuzzySystem, values: Sequence[float]) -> list[float]:
-    return list(infer(system, dict(zip(BOX_INPUTS, values, strict=True))).activations)
+    return list(infer(system, dict(zip(BOX_INPUTS, values, strict=True))).strengths)
 
 
 def strengths(found: AuditView, values: Sequence[float]) -> list[Fraction]:
@@ -313,7 +313,7 @@ def test_random_systems_are_as_strong_as_their_views_within_rounding() -> None:
             for side in found.domain.sides
             if side.variable in names
         }
-        right = infer(system, row).activations
+        right = infer(system, row).strengths
         low, high = both_strengths(found, row)
         ways = [b.activation.method for b in system.blocks for _ in b.rules]
         for number in low:

@@ -41,7 +41,7 @@ def assert_equal(system: FuzzySystem, rows: list[dict[str, float]]) -> None:
     program = from_system(system, activations=True)
     for row in rows:
         right, found = infer(system, row), evaluate_program(program, row)
-        expected = (*right.outputs, *right.activations, float(right.status))
+        expected = (*right.outputs, *right.strengths, float(right.status))
         numbers = found.of("output") + found.of("activation") + found.of("status")
         assert len(numbers) == len(expected)
         assert all(map(equal, numbers, expected)), (row, numbers, expected)
