@@ -28,12 +28,17 @@ from fuzzytree.exporters.fcl_terms import (
     unspeakable,
 )
 from fuzzytree.exporters.fll_text import number, speakable
-from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
+from fuzzytree.exporters.fuzzy_files import (
+    TITLE,
+    FileNames,
+    file_system,
+    refuse,
+    refuse_scores,
+)
 from fuzzytree.formats import FACTS, MARK, read_fcl
 from fuzzytree.model import (
     Format,
     FuzzySystem,
-    Loss,
     NameMap,
     Or,
     RuleBase,
@@ -46,12 +51,7 @@ from fuzzytree.model import (
 from fuzzytree.semantics import (
     Always,
     Scores,
-    as_system,
-    cast_losses,
-    cast_remarks,
-    facts_of,
     flattened,
-    pointed,
     refuse_singletons,
 )
 
@@ -93,32 +93,24 @@ def write(
         '// FCL, dialect portable'
     """
     words = WORDS[dialect]
-    losses: list[Loss] = []
-    remarks: list[str] = []
-    facts = ""
-    if isinstance(model, RuleBase):
-        if scores == "winner":
-            raise LossError(
-                "FCL activates all rules, and not the strongest alone; "
-                "pass scores=rule or scores=class"
-            )
-        always: Always = "any" if words.has_hedges else "term"
-        rules, lost = pointed(model, tolerance)
-        losses += [*cast_losses(model, scores), *lost]
-        system = as_system(rules, scores, always=always)
-        remarks += cast_remarks(model, scores)
-        if model.kind == "relative" and lost:
-            remarks.append(
-                "the decisions are exact: every term is 1 where it was, and less "
-                "elsewhere, so the same rule wins in every row"
-            )
-        facts = FACTS + facts_of(model, scores, always=always)
-    else:
-        if scores != "rule":
-            raise ValueError("scores: are of rules; a system has outputs of its own")
-        refuse_singletons(model, "fcl")
-        system = plain_linear(model) if dialect == "jfuzzylogic" else model
-        system = with_conditions(system, words)
+    refuse_scores(model, scores, "rule")
+    if scores == "winner":
+        raise LossError(
+            "FCL activates all rules, and not the strongest alone; "
+            "pass scores=rule or scores=class"
+        )
+    always: Always = "any" if words.has_hedges else "term"
+    source = file_system(model, tolerance, scores, always=always)
+    system, losses, remarks, facts, is_relative = source
+    if is_relative and any(one.bound is not None for one in losses):
+        remarks.append(
+            "the decisions are exact: every term is 1 where it was, and less "
+            "elsewhere, so the same rule wins in every row"
+        )
+    if model.outputs:
+        refuse_singletons(system, "fcl")
+        plain = plain_linear(system) if dialect == "jfuzzylogic" else system
+        system = with_conditions(plain, words)
         if system != model:
             remarks.append(
                 "rules without a condition, or weighted sums, were rewritten"
@@ -131,7 +123,7 @@ def write(
     if losses and not allow_loss:
         raise refusal(model.name, f"fcl ({dialect})", losses)
     names = _naming(system, words)
-    comments = [one for one in (MARK + dialect, facts) if one]
+    comments = [one for one in (MARK + dialect, facts and FACTS + facts) if one]
     if checklist:
         comments += [f" {line}" for line in check_list(system).splitlines()]
     comments.append(f" {TITLE}")

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import WordsOf, has_not, hedge_losses, rule_text
-from fuzzytree.exporters.fuzzy_files import grid_losses
+from fuzzytree.exporters.fuzzy_files import file_system, grid_losses
 from fuzzytree.formats import (
     DEFUZZIFIERS,
     JFUZZYLOGIC_PAIRS,
@@ -34,7 +34,7 @@ from fuzzytree.model import (
     questions,
     unlike,
 )
-from fuzzytree.semantics import EVERYWHERE, as_system, number_losses
+from fuzzytree.semantics import EVERYWHERE, number_losses
 
 
 def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
@@ -285,7 +285,7 @@ def accu_of(system: FuzzySystem, outputs: set[str], words: FclWords) -> SNorm | 
 _MOST_BASIC, _MOST_EXTENDED = 3, 4  # points of a term
 
 
-def check_list(document: RuleBase | FuzzySystem) -> str:
+def check_list(model: RuleBase | FuzzySystem) -> str:
     """Return the data check list of IEC 61131-7 of a model, a fact to a line.
 
     The standard requires each vendor to state what a controller must be able to do for
@@ -300,9 +300,7 @@ def check_list(document: RuleBase | FuzzySystem) -> str:
         >>> print(check_list(system).splitlines()[0])
         data check list (IEC 61131-7)
     """
-    system = document
-    if isinstance(system, RuleBase):
-        system = as_system(system, "rule", always="term")
+    system = file_system(model, 1e-6, always="term").system
     return "\n".join(_lines(system)) + "\n"
 
 

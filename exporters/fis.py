@@ -17,6 +17,7 @@ from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
 from fuzzytree.exporters.fuzzy_files import (
     TITLE,
     FileNames,
+    file_system,
     grid_losses,
     refuse,
     without_heights,
@@ -54,10 +55,6 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics import (
     FACTS,
-    as_system,
-    cast_losses,
-    cast_remarks,
-    facts_of,
     flattened,
     has_numbers,
     joined_outputs,
@@ -110,18 +107,11 @@ def write(
     """
     if dialect not in DIALECTS:
         raise ValueError(f"no dialect {dialect!r}; there is {', '.join(DIALECTS)}")
-    losses: list[Loss] = []
-    remarks: list[str] = []
-    comments = [TITLE, f"{DIALECT}{dialect}"]
-    if isinstance(model, RuleBase):
-        rules, lost = pointed(model, tolerance)
-        system = as_system(rules, always="term")
-        losses += [*cast_losses(model), *lost]
-        remarks += cast_remarks(model)
-        comments.append(FACTS + facts_of(model, always="term"))
-    else:
-        refuse_singletons(model, "fis")
-        system = model
+    source = file_system(model, tolerance, always="term")
+    system, losses, remarks, facts, _ = source
+    comments = [TITLE, f"{DIALECT}{dialect}", *([FACTS + facts] if facts else [])]
+    if model.outputs:
+        refuse_singletons(system, "fis")
     system, lost = flattened(system)
     losses += lost
     if any(one.height != 1.0 for v in system.all_variables for one in v.terms):

@@ -22,7 +22,14 @@ from fuzzytree.exporters.fll_text import (
     speakable,
     weighted_type,
 )
-from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, grid_losses, refuse
+from fuzzytree.exporters.fuzzy_files import (
+    TITLE,
+    FileNames,
+    file_system,
+    grid_losses,
+    refuse,
+    refuse_scores,
+)
 from fuzzytree.formats import (
     ACTIVATIONS,
     FLL_METHODS,
@@ -57,10 +64,6 @@ from fuzzytree.model import (
 from fuzzytree.semantics import (
     FACTS,
     Scores,
-    as_system,
-    cast_losses,
-    cast_remarks,
-    facts_of,
     flattened,
     has_numbers,
     pointed,
@@ -102,23 +105,15 @@ def write(
         >>> "activation: Highest 1" in text
         True
     """
-    losses: list[Loss] = []
-    remarks: list[str] = []
-    facts = ""
-    if isinstance(model, RuleBase):
-        rules, lost = pointed(model, tolerance)
-        system = as_system(rules, scores)
-        losses += [*cast_losses(model, scores), *lost]
-        remarks += cast_remarks(model, scores)
-        if model.kind != "relative":
-            remarks.append("fuzzylite 6 treats a firing strength below 1e-6 as 0")
-        facts = FACTS + facts_of(model, scores)
-    else:
-        if scores != "winner":
-            raise ValueError("scores: are of rules; a system has outputs of its own")
-        refuse_singletons(model, "fll")
+    refuse_scores(model, scores, "winner")
+    source = file_system(model, tolerance, scores)
+    system, losses, remarks, facts, is_relative = source
+    if facts and not is_relative:
+        remarks.append("fuzzylite 6 treats a firing strength below 1e-6 as 0")
+    if model.outputs:
+        refuse_singletons(system, "fll")
         system, lost = pointed(
-            model,
+            system,
             tolerance,
             keeps=lambda _, term: not isinstance(term.function, Band | LR),
         )
@@ -131,7 +126,7 @@ def write(
     if losses and not allow_loss:
         raise refusal(model.name, "fll", losses)
     names = _naming(system)
-    comments = [f"# {one}" for one in (TITLE, facts) if one]
+    comments = [f"# {one}" for one in (TITLE, facts and FACTS + facts) if one]
     text = "\n".join([*comments, *_text(system, names)]) + "\n"
     remarks += [*_remarks(system, names), *differences(system)]
     remarks += [f"output {o.name!r}: {what}" for o, what, _ in joined_twice(system)]

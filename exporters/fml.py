@@ -13,7 +13,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 from fuzzytree.exporters.fml_rules import FmlRule, FmlRules
-from fuzzytree.exporters.fuzzy_files import FileNames, grid_losses, without_heights
+from fuzzytree.exporters.fuzzy_files import (
+    FileNames,
+    file_system,
+    grid_losses,
+    without_heights,
+)
 from fuzzytree.exporters.xml_text import XmlElement, element, text_element, text_of
 from fuzzytree.formats import (
     FML_METHODS,
@@ -45,10 +50,6 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics import (
     FACTS,
-    as_system,
-    cast_losses,
-    cast_remarks,
-    facts_of,
     flattened,
     has_numbers,
     joined_outputs,
@@ -92,17 +93,9 @@ def write(
         >>> 'xmlns="http://www.ieee1855.org"' in text
         True
     """
-    losses: list[Loss] = []
-    remarks = [_FLOAT32]
-    facts = ""
-    if isinstance(model, RuleBase):
-        rules, lost = pointed(model, tolerance)
-        system = as_system(rules, always="term")
-        losses += [*cast_losses(model), *lost]
-        remarks = [*cast_remarks(model), *remarks]
-        facts = facts_of(model, always="term")
-    else:
-        system = model
+    source = file_system(model, tolerance, always="term")
+    system, losses, remarks, facts, _ = source
+    remarks.append(_FLOAT32)
     system, lost = flattened(system)
     losses += lost
     system, lost = _with_known_curves(system, tolerance)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import NamedTuple
 
 import msgspec
 from msgspec.structs import replace
@@ -15,15 +16,73 @@ from fuzzytree.model import (
     Loss,
     NameMap,
     Points,
+    RuleBase,
     Singleton,
     SystemOutput,
     Term,
     Variable,
     changes_text,
 )
-from fuzzytree.semantics import has_numbers
+from fuzzytree.semantics import (
+    Always,
+    Scores,
+    as_system,
+    cast_losses,
+    cast_remarks,
+    facts_of,
+    has_numbers,
+    pointed,
+)
 
 TITLE = "Written by fuzzytree."
+
+
+class FileSystem(NamedTuple):
+    """The system that a file is of.
+
+    Attributes:
+        system: The system.
+        losses: What it lost on the way.
+        remarks: How its numbers are to be read.
+        facts: Of rules, what a file has no place for; empty of a system.
+        is_relative: Whether it is of the relative rules of a tree.
+    """
+
+    system: FuzzySystem
+    losses: list[Loss]
+    remarks: list[str]
+    facts: str = ""
+    is_relative: bool = False
+
+
+def file_system(
+    model: RuleBase | FuzzySystem,
+    tolerance: float,
+    scores: Scores = "rule",
+    *,
+    always: Always = "nothing",
+) -> FileSystem:
+    """Return rules as the system of their scores with points, and a system as it is."""
+    if isinstance(model, FuzzySystem):
+        return FileSystem(model, [], [])
+    rules, lost = pointed(model, tolerance)
+    return FileSystem(
+        as_system(rules, scores, always=always),
+        [*cast_losses(model, scores), *lost],
+        [*cast_remarks(model, scores)],
+        facts_of(model, scores, always=always),
+        is_relative=model.kind == "relative",
+    )
+
+
+def refuse_scores(model: RuleBase | FuzzySystem, scores: str, usual: str) -> None:
+    """Refuse scores of a system.
+
+    Raises:
+        ValueError: If they are not the usual ones.
+    """
+    if model.outputs and scores != usual:
+        raise ValueError("scores: are of rules; a system has outputs of its own")
 
 
 class FileNames(msgspec.Struct, frozen=True):

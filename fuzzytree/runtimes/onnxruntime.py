@@ -22,7 +22,6 @@ from fuzzytree.model import (
     Document,
     Dtype,
     FloatArray,
-    FuzzySystem,
     ModelKind,
     Outcome,
     Prepared,
@@ -181,13 +180,15 @@ def prepare(
     readable: bool = False,
     plain: bool = False,
     threads: int = 1,
+    strengths: bool = False,
     probabilities: bool = False,
 ) -> Prepared:
     """Write a model as ONNX, in memory, and open it.
 
     A `readable` graph of rules has a node for each operation, for people; a `plain` one
     of a tree has no tree operators. One call uses at most `threads` threads.
-    `probabilities` are returned of rules that have them.
+    `strengths` are returned of the rules of a system, too, and `probabilities` of rules
+    that have them.
 
     Raises:
         LossError: If the number type or the kind of graph cannot hold the model.
@@ -199,13 +200,13 @@ def prepare(
         raise LossError("onnxruntime plain runs trees, and these are rules")
     _require_packages("running")
 
-    outputs: tuple[Output, ...] = ("rule", "status", "strengths")
-    if isinstance(model, FuzzySystem):
-        outputs = ("outputs", "status")
-    elif not model.rules:
-        outputs = outputs[:2]
-    elif probabilities and model.semantics.sharpness:
-        outputs = (*outputs, "probabilities")
+    outputs: list[Output] = ["rule", "status"]
+    if model.outputs:
+        outputs = ["outputs", "status"]
+    if model.rules and (strengths or not model.outputs):
+        outputs.append("activations" if model.outputs else "strengths")
+    if probabilities and model.rules and model.semantics.sharpness:
+        outputs.append("probabilities")
     content = write_onnx(
         model,
         dtype=dtype,
@@ -339,20 +340,9 @@ def _outcome(answers: Outputs, facts: Facts, values: FloatArray) -> Outcome:
     return Outcome(rule, status, strengths, answers.get("probabilities"), outputs)
 
 
-def _load_system(system: FuzzySystem, *, with_strengths: bool) -> Run:
-    """Write a fuzzy system as ONNX, in memory, and return what runs it."""
-    _require_packages("running")
-
-    outputs: tuple[Output, ...] = ("outputs", "status", "activations")
-    outputs = outputs if with_strengths else outputs[:2]
-    content = write_onnx(system, outputs=outputs, verify=False).content
-    facts = _facts(_decoded(content, system.name), system.name)
-    return _runner(exporters.open_bare(content), facts)
-
-
 def _rows_at_once(facts: Facts) -> int:
     """Return how many rows are answered together, so that they stay in the cache."""
-    if facts.representation == "tree":
+    if facts.kind == "descent":
         return max(2**12, min(2**16, 2**22 // facts.rules))
     if facts.names:
         return min(max(facts.chunk, 1), 2**16)
@@ -565,9 +555,7 @@ def _runtime(
     make = functools.partial(prepare, dtype=dtype, readable=readable, plain=plain)
 
     def load(model: Document, *, with_strengths: bool = True) -> Run:
-        if isinstance(model, FuzzySystem):
-            return _load_system(model, with_strengths=with_strengths)
-        return make(model, probabilities=True).run
+        return make(model, strengths=with_strengths, probabilities=True).run
 
     return Runtime(
         name=f"onnxruntime {name}",
