@@ -10,7 +10,7 @@ so that nothing in it can be mistaken for code, in a file or in a page of HTML.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Literal
 
 from fuzzytree.exporters.js_steps import HELPERS, JsSteps
@@ -31,6 +31,8 @@ from fuzzytree.exporters.js_text import (
     text_of,
 )
 from fuzzytree.exporters.program_text import (
+    DECISION,
+    INFERENCE,
     class_number,
     examples_of,
     node_rows,
@@ -52,8 +54,6 @@ from fuzzytree.model import (
     sentence,
 )
 from fuzzytree.semantics import (
-    Program,
-    ResultKind,
     few_probes,
     from_axes,
     from_rules,
@@ -61,8 +61,6 @@ from fuzzytree.semantics import (
     row_probabilities,
 )
 
-_DECISION: tuple[ResultKind, ...] = ("class", "rule", "status", "strength")
-_INFERENCE: tuple[ResultKind, ...] = ("output", "status", "activation")
 _MOST_EXAMPLES = 64
 _FEWEST_EXAMPLES = 8
 _STRENGTHS = 20_000  # of all examples together
@@ -135,23 +133,24 @@ def _body(model: Document, rated: RuleBase | None) -> Iterator[str]:
             yield filled(DECIDE, what="class, leaf number and status", strengths="")
         case RuleBase():
             yield from _classes(model)
-            comments = [*_DECISION[:3], *map(sentence, model.rules)]
-            kinds, shown = _DECISION, ", strengths"
+            comments = [*DECISION[:3], *map(sentence, model.rules)]
+            kinds, shown = DECISION, ", strengths"
             what = "class, rule number, status and strengths"
             if rated is not None:
-                kinds = (*_DECISION, "probability")
+                kinds = (*DECISION, "probability")
                 comments += [f"probability of {name}" for name in model.classes]
                 what += ", and probabilities"
                 count = len(model.rules)
                 shown = f", strengths: strengths.slice(0, {count})"
                 shown += f", probabilities: strengths.slice({count})"
             program = from_rules(model, probabilities=rated is not None)
-            yield from _numbers(program, kinds, comments)
+            yield from JsSteps(program).function(kinds, comments)
             yield filled(DECIDE, what=what, strengths=shown)
             yield STRENGTHS
         case FuzzySystem():
             yield from table("OUTPUTS", map(_entry_of, model.outputs))
-            yield from _numbers(from_system(model, activations=True), _INFERENCE)
+            program = from_system(model, activations=True)
+            yield from JsSteps(program).function(INFERENCE)
             yield INFER
     yield ROWS
     yield "\n/* Inputs, numbers, and how far these may be off: only where functions"
@@ -193,28 +192,6 @@ def _tree(tree: FuzzyTree) -> Iterator[str]:
     missing = str(class_number(tree.semantics.missing, tree))
     yield filled(TREE.removeprefix("\n"), axes=axes, missing=missing)
     yield HELPERS["below"]
-
-
-def _numbers(
-    program: Program, kinds: Sequence[ResultKind], comments: Sequence[str] = ()
-) -> Iterator[str]:
-    """Yield the function `numbers`, and the tables and functions that it needs."""
-    steps = JsSteps(program)
-    body = list(steps.body())
-    results = [one for kind in kinds for one in program.results if one.kind == kind]
-    comments = comments or [one.title for one in results]
-    pairs = zip(results, comments, strict=True)
-    lines = [f"    {steps.value(a.step)}, // {text_of(b)}\n" for a, b in pairs]
-    for numbers, name in steps.tables.items():
-        yield f"\nconst {name} = {numbers};\n"
-    *others, last = kinds
-    yield f"\n/* Return {', '.join(others)} and {last} as numbers. */"
-    yield "\nfunction numbers(x) {\n"
-    yield from body
-    yield "  return [\n"
-    yield from lines
-    yield "  ];\n}\n"
-    yield from steps.helpers()
 
 
 def _examples(model: Document, rated: RuleBase | None) -> Iterator[str]:

@@ -128,6 +128,10 @@ class JsSteps(ScriptSteps):
 
     statement = "  const {} = {};"
     comment = "//"
+    setting = "\nconst {} = {};\n"
+    opening = "\n/* Return {} as numbers. */\nfunction numbers(x) {{\n"
+    result = "    {}, // {}\n"
+    ending = "  return [\n", "  ];\n}\n"
     functions = HELPERS
     signs: ClassVar[Mapping[str, str]] = {
         **ScriptSteps.signs,

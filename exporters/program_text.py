@@ -26,6 +26,7 @@ from fuzzytree.numerics import rounded
 from fuzzytree.semantics import (
     Answer,
     Program,
+    ResultKind,
     Row,
     Step,
     StepValue,
@@ -232,6 +233,11 @@ def named_steps(program: Program, places: Sequence[int]) -> dict[int, str]:
     return named
 
 
+DECISION: tuple[ResultKind, ...] = ("class", "rule", "status", "strength")
+INFERENCE: tuple[ResultKind, ...] = ("output", "status", "activation")
+"""What functions of generated scripts return, in order."""
+
+
 class ScriptSteps(StepText):
     """The steps as statements of a language without types: first `body`, then the rest.
 
@@ -239,6 +245,10 @@ class ScriptSteps(StepText):
         variable: The name of a step's result, for its place.
         statement: What sets it to an expression.
         comment: What begins a comment.
+        setting: How a table is set, with its name and numbers.
+        opening: How the function `numbers` begins, with its results in words.
+        result: A line of a result, with its comment.
+        ending: What stands before and behind these lines.
         functions: The text of each function that a program may need.
         tables: The name of each table, by its numbers as text.
     """
@@ -246,6 +256,10 @@ class ScriptSteps(StepText):
     variable = "v{}"
     statement: str
     comment: ClassVar[str]
+    setting: ClassVar[str]
+    opening: ClassVar[str]
+    result: ClassVar[str]
+    ending: ClassVar[tuple[str, str]]
     functions: ClassVar[Mapping[str, str]]
 
     def __init__(self, program: Program) -> None:
@@ -283,6 +297,24 @@ class ScriptSteps(StepText):
         return self.tables.setdefault(
             self.literal(tuple(numbers)), f"TABLE_{len(self.tables)}"
         )
+
+    def function(
+        self, kinds: Sequence[ResultKind], comments: Sequence[str] = ()
+    ) -> Iterator[str]:
+        """Yield the function `numbers`, and the tables and functions that it needs."""
+        body = list(self.body())
+        results = [x for kind in kinds for x in self.program.results if x.kind == kind]
+        comments = comments or [one.title for one in results]
+        lines = [
+            self.result.format(self.value(one.step), self.literal(comment))
+            for one, comment in zip(results, comments, strict=True)
+        ]
+        for numbers, name in self.tables.items():
+            yield self.setting.format(name, numbers)
+        *others, last = kinds
+        yield self.opening.format(f"{', '.join(others)} and {last}")
+        before, behind = self.ending
+        yield from (*body, before, *lines, behind, *self.helpers())
 
     def helpers(self) -> Iterator[str]:
         """Yield the functions that the body needs."""

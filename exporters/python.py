@@ -16,6 +16,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import ClassVar
 
 from fuzzytree.exporters.program_text import (
+    DECISION,
+    INFERENCE,
     ScriptSteps,
     examples_of,
     node_rows,
@@ -35,8 +37,6 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics import (
     OVER_SAMPLES,
-    Program,
-    ResultKind,
     Step,
     from_axes,
     from_rules,
@@ -45,8 +45,6 @@ from fuzzytree.semantics import (
 )
 
 _EXAMPLES = 6
-_DECISION: tuple[ResultKind, ...] = ("class", "rule", "status", "strength")
-_INFERENCE: tuple[ResultKind, ...] = ("output", "status", "activation")
 
 _START = """\
 import math
@@ -191,13 +189,14 @@ def _body(model: Document) -> Iterator[str]:
             yield from _tree(model)
         case RuleBase():
             yield from _lines("CLASSES", (f"{label!r}," for label in model.classes))
-            titles = [*_DECISION[:3], *map(sentence, model.rules)]
-            yield from _numbers(from_rules(model), _DECISION, titles)
+            titles = [*DECISION[:3], *map(sentence, model.rules)]
+            yield from _Steps(from_rules(model)).function(DECISION, titles)
             yield _RULES.replace("@values@", _values(model))
         case FuzzySystem():
             names = (f"{one.name!r},  # {one.unit!r}" for one in model.outputs)
             yield from _lines("OUTPUTS", names)
-            yield from _numbers(from_system(model, activations=True), _INFERENCE)
+            program = from_system(model, activations=True)
+            yield from _Steps(program).function(INFERENCE)
             yield _SYSTEM.replace("@values@", _values(model))
 
 
@@ -221,30 +220,6 @@ def _tree(tree: FuzzyTree) -> Iterator[str]:
     yield from steps.body()
     yield f"    axes = [{', '.join(map(steps.value, program.of('output')))}]\n"
     yield _TREE.replace("@missing@", repr(tree.semantics.missing))
-
-
-def _numbers(
-    program: Program, kinds: Sequence[ResultKind], titles: Sequence[str] = ()
-) -> Iterator[str]:
-    """Yield the function `numbers`, and the tables and functions that it needs."""
-    steps = _Steps(program)
-    body = list(steps.body())
-    results = [one for kind in kinds for one in program.results if one.kind == kind]
-    titles = titles or [one.title for one in results]
-    lines = [
-        f"        {steps.value(result.step)},  # {title!r}\n"
-        for result, title in zip(results, titles, strict=True)
-    ]
-    for numbers, name in steps.tables.items():
-        yield f"\n{name} = {numbers}\n"
-    *others, last = kinds
-    yield "\n\ndef numbers(x):\n"
-    yield f'    """Return {", ".join(others)} and {last} as numbers."""\n'
-    yield from body
-    yield "    return [\n"
-    yield from lines
-    yield "    ]\n"
-    yield from steps.helpers()
 
 
 def _values(model: Document) -> str:
@@ -302,6 +277,10 @@ class _Steps(ScriptSteps):
 
     statement = "    {} = {}"
     comment = " #"
+    setting = "\n{} = {}\n"
+    opening = '\n\ndef numbers(x):\n    """Return {} as numbers."""\n'
+    result = "        {},  # {}\n"
+    ending = "    return [\n", "    ]\n"
     functions: ClassVar[Mapping[str, str]] = {
         "minimum": """
 

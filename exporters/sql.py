@@ -10,11 +10,16 @@ from __future__ import annotations
 
 import importlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, get_args
 
 from fuzzytree.errors import LossError, MissingExtraError
-from fuzzytree.exporters.program_text import rated_rules, source_of, title_of
+from fuzzytree.exporters.program_text import (
+    INFERENCE,
+    rated_rules,
+    source_of,
+    title_of,
+)
 from fuzzytree.exporters.sql_reach import LARGEST
 from fuzzytree.exporters.sql_steps import REMEDY, SqlSteps
 from fuzzytree.exporters.sql_text import LIMITS, TRANSLATED, Dialect, Query
@@ -30,8 +35,6 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics import (
     Program,
-    Result,
-    ResultKind,
     from_axes,
     from_rules,
     from_system,
@@ -107,14 +110,14 @@ def write(
             _refuse_deep(model)
             lines = _tree(query, model)
         case RuleBase():
-            kinds: list[ResultKind] = []
-            if strengths:
-                kinds.append("strength")
-            if probabilities:
-                kinds.append("probability")
-            lines = _rules(query, model, kinds)
+            program = from_rules(model, probabilities=probabilities)
+            wanted = {"strength": strengths, "probability": probabilities}
+            kinds = ("class", "rule", "status", *(k for k in wanted if wanted[k]))
+            comments = _sentences(program, model)
+            lines = _program(query, model, program, kinds, comments)
         case FuzzySystem():
-            lines = _system(query, model, activations=strengths)
+            program = unrolled(from_system(model, activations=strengths))
+            lines = _program(query, model, program, INFERENCE, {})
     text = "\n".join([*lines, ""])
     if query.is_translated:
         text = _translated(text, dialect)
@@ -199,9 +202,15 @@ def _last(query: Query, results: Iterable[tuple[str, str]], source: str) -> str:
 
 
 def _program(
-    query: Query, model: Document, steps: SqlSteps, results: Sequence[Result]
+    query: Query,
+    model: Document,
+    program: Program,
+    kinds: Sequence[str],
+    comments: Mapping[int, str],
 ) -> Iterator[str]:
     """Yield the queries of a program whose results are named after their kind."""
+    results = [one for kind in kinds for one in program.results if one.kind == kind]
+    steps = SqlSteps(query, program, [one.step for one in results], comments)
     classes = enumerate(model.classes)
     ends = [f"WHEN {k}e0 THEN {query.text(name)}" for k, name in classes]
 
@@ -225,26 +234,12 @@ def _program(
     yield _last(query, named(), steps.name_of(len(steps.levels)))
 
 
-def _results(program: Program, kinds: Iterable[ResultKind]) -> list[Result]:
-    return [one for kind in kinds for one in program.results if one.kind == kind]
-
-
-def _rules(query: Query, rules: RuleBase, kinds: Sequence[ResultKind]) -> Iterator[str]:
-    program = from_rules(rules, probabilities="probability" in kinds)
-    results = _results(program, ("class", "rule", "status", *kinds))
+def _sentences(program: Program, rules: RuleBase) -> dict[int, str]:
+    """Return each rule by the step of its strength."""
     # What is shown is the strength where all values are known, else NaN.
     shown = [program.steps[place].arguments for place in program.of("strength")]
     places = [one[1] if len(one) == 3 else -1 for one in shown]
-    comments = dict(zip(places, map(sentence, rules.rules), strict=True))
-    steps = SqlSteps(query, program, [one.step for one in results], comments)
-    return _program(query, rules, steps, results)
-
-
-def _system(query: Query, system: FuzzySystem, *, activations: bool) -> Iterator[str]:
-    program = unrolled(from_system(system, activations=activations))
-    results = _results(program, ("output", "status", "activation"))
-    steps = SqlSteps(query, program, [one.step for one in results], {})
-    return _program(query, system, steps, results)
+    return dict(zip(places, map(sentence, rules.rules), strict=True))
 
 
 def _tree(query: Query, tree: FuzzyTree) -> Iterator[str]:
