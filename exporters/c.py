@@ -14,6 +14,7 @@ from typing import Literal
 from fuzzytree.exporters.c_fixed import Q15, Q31
 from fuzzytree.exporters.c_rules import probability_code, rules_code
 from fuzzytree.exporters.c_selftest import selftest_code
+from fuzzytree.exporters.c_steps import HELPERS, WORDS
 from fuzzytree.exporters.c_systems import system_file
 from fuzzytree.exporters.c_tables import CModel
 from fuzzytree.exporters.c_text import (
@@ -343,15 +344,9 @@ def _described(one: Variable | SystemOutput) -> str:
     return remark(text)
 
 
-_FINITE = """
-/* Look at the exponent, without a library: it is full in infinities and no numbers. */
-static int name_is_finite(name_real value)
-{
-    union { name_real value; UINT bits; } look;
-    look.value = value;
-    return ~HIGH << 1 >> REST != 0;
-}
-"""
+_FINITE = f"""
+/* Look at the exponent, without a library: it is full in infinities and no numbers. */\
+{HELPERS["is_finite"]}"""
 
 _INPUTS = """
 static int name_has_all(const name_real *x)
@@ -447,12 +442,8 @@ def axes_code(
     if not variables:
         yield _NO_INPUTS
         return
-    if numbers.name == "double":
-        words = ("uint64_t", "(uint32_t)(look.bits >> 32)", "21")
-    else:
-        words = ("uint32_t", "look.bits", "24")
     text = _FINITE
-    for mark, word in zip(("UINT", "HIGH", "REST"), words, strict=True):
+    for mark, word in WORDS[numbers.name].items():
         text = text.replace(mark, word)
     mixed = [variable for variable in variables if variable.parts]
     stand = stand_ins(variables)
@@ -548,7 +539,6 @@ def tree_code(file: CModel, axes: str) -> Iterator[str]:
 FORMAT = Format(
     name="c",
     suffixes=(".c",),
-    carries=("tree", "rules", "system"),
     write=write_c,
     dtype="float64",
 )

@@ -351,11 +351,7 @@ def _combined(steps: Sequence[Step], step: Step) -> tuple[int, FloatArray] | Non
 def _fitted(
     program: Program, ranges: Sequence[tuple[float, float]], numbers: FixedNumbers
 ) -> tuple[list[int], Worst]:
-    """Return how many bits each step has behind the point, and the worst errors.
-
-    Raises:
-        ValueError: As for `FixedSteps`.
-    """
+    """Return how many bits each step has behind the point, and the worst errors."""
     needed = needed_steps(program.steps, program.results)
     for place in needed:
         operation = program.steps[place].operation

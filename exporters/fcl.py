@@ -166,11 +166,7 @@ def _naming(system: FuzzySystem, words: FclWords) -> _FclNames:
 
 
 def _refused(system: FuzzySystem, words: FclWords) -> FuzzySystem:
-    """Return a system that the dialect has words for.
-
-    Raises:
-        LossError: With everything that has no place.
-    """
+    """Return a system that the dialect has words for."""
     reasons = list(unspeakable(system, words))
     for output in system.outputs:
         where = f"output {output.name!r}"

@@ -155,11 +155,7 @@ def _naming(system: FuzzySystem, terms: FisTerms) -> FileNames:
 
 
 def _lines(system: FuzzySystem, terms: FisTerms) -> list[FisRule]:
-    """Return all rules.
-
-    Raises:
-        LossError: With every rule that has no place in FIS.
-    """
+    """Return all rules."""
     lines: list[FisRule] = []
     reasons: list[str] = []
     placed = [(block, rule) for block in system.blocks for rule in block.rules]

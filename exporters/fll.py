@@ -159,11 +159,7 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
 
 
 def _speakable(system: FuzzySystem) -> tuple[RuleBlock, ...]:
-    """Return blocks that FLL has words for.
-
-    Raises:
-        LossError: With every rule and term that has no place in FLL.
-    """
+    """Return blocks that FLL has words for."""
     reasons: list[str] = []
     blocks: list[RuleBlock] = []
     for block in system.blocks:

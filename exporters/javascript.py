@@ -35,8 +35,7 @@ from fuzzytree.exporters.program_text import (
     INFERENCE,
     class_number,
     examples_of,
-    node_rows,
-    places_of,
+    node_lines,
     rated_rules,
     source_of,
     title_of,
@@ -170,17 +169,9 @@ def _classes(model: Model) -> Iterator[str]:
 
 
 def _tree(tree: FuzzyTree) -> Iterator[str]:
-    places = places_of(tree.variables)
     yield "\n/* Line of the variable, cuts, and for each interval the next node's place"
     yield "\n * or -k for leaf k. A value on a cut belongs to the interval below it. */"
-    yield from table(
-        "NODES",
-        (
-            f"{literal(row)}, // {text_of(node.variable)}: "
-            f"{', '.join(map(text_of, names))}"
-            for row, node, names in node_rows(tree, places)
-        ),
-    )
+    yield from table("NODES", node_lines(tree, literal, " //"))
     yield "\n/* Places of the leaves' classes. */"
     yield from table("LEAVES", (f"{tree.classes.index(x.label)}," for x in tree.leaves))
     program = from_axes(tree)
@@ -211,7 +202,6 @@ def _examples(model: Document, rated: RuleBase | None) -> Iterator[str]:
 FORMAT = Format(
     name="javascript",
     suffixes=(".mjs", ".js"),
-    carries=("tree", "rules", "system"),
     write=write,
     dtype="float64",
 )

@@ -245,11 +245,7 @@ def require(package: str, purpose: str) -> None:
 def _columns(
     model: Model | FuzzySystem, signature: Signature, columns: Sequence[str]
 ) -> tuple[str, ...]:
-    """Return the columns of the input; none if rows of any width are taken.
-
-    Raises:
-        ValueError: If one stands twice, or one that the model needs is not there.
-    """
+    """Return the columns of the input; none if rows of any width are taken."""
     if columns:
         is_wrong = len(set(columns)) < len(columns) or any(map(text_fault, columns))
         lacking = [repr(name) for name in model.inputs if name not in columns]
@@ -420,7 +416,6 @@ def version() -> str:
 FORMAT = Format(
     name="onnx",
     suffixes=(".onnx",),
-    carries=("tree", "rules", "system"),
     write=write_onnx,
     cannot=(
         "an onnx file runs, but is not read back as a tree, rule base or system",

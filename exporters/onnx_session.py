@@ -125,11 +125,7 @@ def prove(
 def _run(
     content: bytes, model: str, names: Sequence[str], values: Array
 ) -> dict[str, Array]:
-    """Return the named outputs of a file for some rows.
-
-    Raises:
-        LossError: If onnxruntime does not load or run the file.
-    """
+    """Return the named outputs of a file for some rows."""
     try:
         result = open_bare(content)(list(names), {"inputs": values})
     except RUNTIME_ERRORS as error:

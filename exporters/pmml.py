@@ -502,7 +502,6 @@ def _compound(operator: str, parts: list[XmlElement]) -> XmlElement:
 FORMAT = Format(
     name="pmml",
     suffixes=(".pmml",),
-    carries=("tree", "rules", "system"),
     write=write,
     cannot=(
         "a pmml file runs, but is not read back as what it was written from",

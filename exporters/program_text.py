@@ -363,9 +363,6 @@ def examples_of(
         yield Example(operands, answer_of(model, row), bounds)
 
 
-TableRow = tuple[object, ...]
-
-
 def places_of(variables: Sequence[Variable]) -> dict[str, int]:
     """Return the place of each variable's value: inputs first, then combinations."""
     inputs = [variable.name for variable in variables if not variable.parts]
@@ -382,17 +379,20 @@ def targets_of(node: Node) -> tuple[int, ...]:
     return tuple(ends[owner] for owner in node.owners)
 
 
-def node_rows(
-    tree: FuzzyTree, places: dict[str, int]
-) -> Iterator[tuple[TableRow, Node, list[str]]]:
+def node_lines(
+    tree: FuzzyTree, literal: Callable[[object], str], comment: str
+) -> Iterator[str]:
     """Yield each node's place of the value, cuts and targets; and its terms' names."""
+    places = places_of(tree.variables)
     for node in tree.nodes:
         counts = [0] * len(node.branches)
         names: list[str] = []
         for owner, _ in zip(node.owners, intervals(node), strict=True):
             names.append(node.branches[owner].terms[counts[owner]])
             counts[owner] += 1
-        yield (places[node.variable], node.cuts, targets_of(node)), node, names
+        row = places[node.variable], node.cuts, targets_of(node)
+        shown = ", ".join(map(literal, names))
+        yield f"{literal(row)},{comment} {literal(node.variable)}: {shown}"
 
 
 class TreeTest(NamedTuple):

@@ -20,8 +20,7 @@ from fuzzytree.exporters.program_text import (
     INFERENCE,
     ScriptSteps,
     examples_of,
-    node_rows,
-    places_of,
+    node_lines,
     title_of,
 )
 from fuzzytree.model import (
@@ -190,30 +189,23 @@ def _body(model: Document) -> Iterator[str]:
         case RuleBase():
             yield from _lines("CLASSES", (f"{label!r}," for label in model.classes))
             titles = [*DECISION[:3], *map(sentence, model.rules)]
-            yield from _Steps(from_rules(model)).function(DECISION, titles)
+            yield from PythonSteps(from_rules(model)).function(DECISION, titles)
             yield _RULES.replace("@values@", _values(model))
         case FuzzySystem():
             names = (f"{one.name!r},  # {one.unit!r}" for one in model.outputs)
             yield from _lines("OUTPUTS", names)
             program = from_system(model, activations=True)
-            yield from _Steps(program).function(INFERENCE)
+            yield from PythonSteps(program).function(INFERENCE)
             yield _SYSTEM.replace("@values@", _values(model))
 
 
 def _tree(tree: FuzzyTree) -> Iterator[str]:
-    places = places_of(tree.variables)
     yield "\n# Line of the variable, cuts, and for each interval the next node's place"
     yield "\n# or -k for leaf k. A value on a cut belongs to the interval below it."
-    yield from _lines(
-        "NODES",
-        (
-            f"{_literal(row)},  # {node.variable!r}: {', '.join(map(repr, names))}"
-            for row, node, names in node_rows(tree, places)
-        ),
-    )
+    yield from _lines("NODES", node_lines(tree, _literal, "  #"))
     yield from _lines("LEAVES", (f"{leaf.label!r}," for leaf in tree.leaves))
     program = from_axes(tree)
-    steps = _Steps(program)
+    steps = PythonSteps(program)
     yield "\n\ndef answer(values):\n"
     yield '    """Return class, leaf number and status for the inputs in order."""\n'
     yield f"    x = {_values(tree)}\n"
@@ -272,7 +264,7 @@ _CALLS: Mapping[str, str] = {
 """What operations call, where that is no function of their name and of two numbers."""
 
 
-class _Steps(ScriptSteps):
+class PythonSteps(ScriptSteps):
     """A program as text."""
 
     statement = "    {} = {}"
@@ -438,7 +430,6 @@ def _examples(model: Document) -> Iterator[str]:
 FORMAT = Format(
     name="python",
     suffixes=(".py",),
-    carries=("tree", "rules", "system"),
     write=write_python,
     dtype="float64",
 )

@@ -39,7 +39,6 @@ def write(model: Document, /, *, allow_loss: bool = False) -> Written:
 FORMAT = Format(
     name="smt-lib",
     suffixes=(".smt2",),
-    carries=("tree", "rules", "system"),
     write=write,
     cannot=(
         "norms other than minimum, product and maximum",

@@ -293,7 +293,6 @@ def _tree(query: Query, tree: FuzzyTree) -> Iterator[str]:
 FORMAT = Format(
     name="sql",
     suffixes=(".sql",),
-    carries=("tree", "rules", "system"),
     write=write,
     cannot=(
         "an sql file runs, but is not read back as a model",

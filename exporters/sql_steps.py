@@ -349,11 +349,7 @@ class SqlSteps:
         return f"CASE WHEN {' AND '.join(tests)} THEN {text}{rest} END"
 
     def _other(self, operation: str) -> str:
-        """Return what few formulas use.
-
-        Raises:
-            LossError: If the dialect cannot compute it.
-        """
+        """Return what few formulas use."""
         match operation:
             case "round":
                 return _ROUND

@@ -297,11 +297,7 @@ _FIXED = ("is_number", "status", "is_known", "k", "halves")
 def _written_system(
     system: FuzzySystem, numbers: StNumbers, name: str, source: str, layout: Layout
 ) -> Written:
-    """Return a system as a function block, in ASCII.
-
-    Raises:
-        LossError: If it needs what the language has not.
-    """
+    """Return a system as a function block, in ASCII."""
     program = from_system(system)
     taken = [f"{c}{k}" for c in "vbot" for k in range(len(program.steps))]
     given = name or system.name
@@ -383,7 +379,6 @@ def _results(system: FuzzySystem, steps: SystemSteps, names: NameMap) -> Iterato
 FORMAT = Format(
     name="structured-text",
     suffixes=(".st",),
-    carries=("tree", "rules", "system"),
     write=write,
     cannot=("formulas with a division or a power", "functions such as tanh or log"),
     dtype="float64",

@@ -463,7 +463,6 @@ def _rule(rule: SystemRule) -> dict[str, Entry]:
 FORMAT = Format(
     name="yaml",
     suffixes=(".yaml", ".yml"),
-    carries=("tree", "rules", "system"),
     write=write,
     read=read_yaml,
 )

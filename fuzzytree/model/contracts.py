@@ -155,8 +155,8 @@ class Format(msgspec.Struct, frozen=True):
     Attributes:
         name: As in `--to`.
         suffixes: With the dot; the first is the usual one.
-        carries: What the format can hold.
         write: Model to bytes.
+        carries: What the format can hold; every kind of model unless given.
         read: Bytes and a name for messages to a reading; None if it cannot be read.
             Raises ReadError with all mistakes of the file. Its keyword `dialect`, if
             it has one, is a Literal of those whose meaning a file can have.
@@ -168,8 +168,8 @@ class Format(msgspec.Struct, frozen=True):
 
     name: str
     suffixes: tuple[str, ...]
-    carries: tuple[ModelKind, ...]
     write: Writer
+    carries: tuple[ModelKind, ...] = ("tree", "rules", "system")
     read: Callable[..., Reading] | None = None
     cannot: tuple[str, ...] = ()
     extra: str | None = None

@@ -17,7 +17,7 @@ from fuzzytree.checking.comparing import same_bits
 from fuzzytree.exporters.python import (
     _START,
     FORMAT,
-    _numbers,
+    PythonSteps,
     parameters,
     write_python,
 )
@@ -116,8 +116,9 @@ def test_what_python_fails_at_is_what_c_makes_of_it() -> None:
             continue
         place = make(name, *map(make.input, inputs))
         program = make.program("p", inputs, (result_of("output", "y", place),))
+        steps = PythonSteps(program)
         space = executed(
-            "".join([_START, *_numbers(program, ("output", "status"))]).encode()
+            "".join([_START, *steps.function(("output", "status"))]).encode()
         )
         for row in itertools.product(numbers, repeat=count):
             given = np.array(space["numbers"](row))

@@ -80,7 +80,7 @@ def command(options: TactileExportOptions) -> int:
         raise click.UsageError(f"{options.output}: {text}")
     write: Any = write_frames_c if form == "c" else onnx_frames.write_frames
     with wrong_options():
-        known = Format(form, (f".{form}",), ("tree", "rules"), write)  # for its options
+        known = Format(form, (f".{form}",), write, ("tree", "rules"))  # for its options
         values: dict[str, Any] = option_values(known, map(setting, options.settings))
     if form == "onnx":
         require("onnxruntime", "verifying a written onnx file needs")
