@@ -121,9 +121,7 @@ def write(
                 model, names, is_exact=curves == "exact", is_rated=probabilities
             )
     source = source_of(write, model, locals())
-    functions = names.functions
-    axes = [*_axes(model.variables, functions)]
-    transformations = [*functions.defined.values(), *axes, *fields]
+    transformations = [*names.functions.defined.values(), *names.axes, *fields]
     values = [element("Value", value=name) for name in model.classes]
     target = element("DataField", *values, name=names.target, **TEXT)
     data = element("DataDictionary", *_columns(model.variables), target)
@@ -187,12 +185,14 @@ class _Names:
     Attributes:
         target: The field of the class.
         functions: The functions.
+        axes: The fields of combinations.
     """
 
     def __init__(self, model: Model) -> None:
         self._taken = {variable.name for variable in model.variables}
         self.target = self.new("class")
         self.functions = Functions()
+        self.axes = [*_axes(model.variables, self.functions)]
 
     def new(self, name: str) -> str:
         """Return a name for one more field."""
