@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree import exporters
-from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
+from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters import FORMAT_VERSION, OPERATORS, Output, write_onnx
 from fuzzytree.model import (
     Document,
@@ -228,11 +228,8 @@ def prepare(
 
 
 def _require_packages(doing: str) -> None:
-    import importlib.util
-
     for package in ("onnx", "onnxruntime"):
-        if importlib.util.find_spec(package) is None:
-            raise MissingExtraError(f"{doing} onnx files needs {install_hint('onnx')}")
+        exporters.require(package, f"{doing} onnx files needs")
 
 
 def _caller(
