@@ -1,11 +1,4 @@
-"""Writers of models, one module per format, and the table of formats.
-
-A format is a module here with a constant `FORMAT` (see
-`fuzzytree.model.contracts.Format`) and a line in `TABLE`; `docs/how-to/add-a-format.md`
-shows how to add one. Third-party packages offer theirs by the entry point group
-`fuzzytree.formats`. A module is imported when its format is used, and a third-party
-package only for a format that this table lacks.
-"""
+"""Writers of models, one module per format; `fuzzytree.exporters.table` lists them."""
 
 import lazy_loader
 
