@@ -125,15 +125,8 @@ def rules_from_tree(
             model is no tree.
     """
     if kind == "raw" and tree.nodes and not tree.sets:
-        raise InvalidModelError(
-            [
-                (
-                    ("sets",),
-                    f"tree {tree.name!r} carries no fitted sets, "
-                    "so it has no raw rules",
-                )
-            ]
-        )
+        text = f"tree {tree.name!r} carries no fitted sets, so it has no raw rules"
+        raise InvalidModelError([(("sets",), text)])
     semantics = tree.semantics
     if kind == "raw":  # probabilities belong to relative strengths
         semantics = msgspec.structs.replace(semantics, sharpness=msgspec.UNSET)

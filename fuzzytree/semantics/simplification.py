@@ -31,7 +31,7 @@ import functools
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from fractions import Fraction
 from functools import partial
-from typing import cast
+from typing import TypeVar, cast
 
 import msgspec
 from msgspec.structs import replace
@@ -42,8 +42,6 @@ from fuzzytree.model import (
     Condition,
     Document,
     Formula,
-    FuzzySystem,
-    FuzzyTree,
     Linear,
     Not,
     Part,
@@ -64,6 +62,9 @@ from fuzzytree.model import (
     shapes_of,
 )
 from fuzzytree.semantics.satisfiability import always_holds, never_firing
+
+D = TypeVar("D", bound=Document)
+_Same = Mapping[str, Mapping[str, str]]  # of each variable, a term and its stand-in
 
 USES: tuple[Use, ...] = ("tree", "relative", "raw")
 
@@ -133,13 +134,22 @@ def pruned(
         ["the fitted sets of 'x1'"]
     """
     _check_uses(model, uses)
+    removed: list[Removed] = []
+    numbers = _numbers_left(model, _idle_rules(model) if rules else {}, removed)
+    variables = [*model.variables]
+    if model.leaves and "relative" not in uses:
+        variables = _without_flanks(variables, removed)
+    same = _stand_ins(variables, removed)
     if model.outputs:
-        system = cast("FuzzySystem", model)
-        return _pruned_system(system, drops_inputs=inputs, drops_rules=rules)
-    if model.rules:
-        base = cast("RuleBase", model)
-        return _pruned_rules(base, drops_inputs=inputs, drops_rules=rules)
-    return _pruned_tree(cast("FuzzyTree", model), uses, drops_inputs=inputs)
+        left: Document = _reworded_system(with_rules(model, numbers), same)
+    elif model.rules:
+        left = _reworded_rules(cast("RuleBase", model), numbers, same, removed)
+    else:
+        left = _reworded_tree(model, uses, same, removed)
+    left = replace(left, variables=tuple(_merged(variables, same)))
+    left = with_named_terms(left, removed)
+    kept = _used_variables(left, removed, drops_inputs=inputs)
+    return Pruned(replace(left, variables=kept), tuple(removed), tuple(numbers))
 
 
 def _check_uses(model: Document, uses: Collection[Use]) -> None:
@@ -155,13 +165,17 @@ def _check_uses(model: Document, uses: Collection[Use]) -> None:
         )
 
 
-# --- rule bases
+def _idle_rules(model: Document) -> Mapping[int, str]:
+    """Return the rules that change no answer, by number, with the reason."""
+    if model.outputs:
+        return never_activated(model)
+    return never_firing(cast("RuleBase", model)) if model.rules else {}
 
 
-def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> Pruned:
-    removed: list[Removed] = []
-    numbers = _numbers_left(rules, never_firing(rules) if drops_rules else {}, removed)
-    same = _stand_ins(rules.variables, removed)
+def _reworded_rules(
+    rules: RuleBase, numbers: Iterable[int], same: _Same, removed: list[Removed]
+) -> RuleBase:
+    """Return some of the rules, without propositions that change no strength."""
     is_min = rules.semantics.conjunction == "minimum"
     # Rules of a tree share their propositions, and these may name thousands of terms.
     renamed = functools.cache(partial(_renamed, same=same))
@@ -177,24 +191,15 @@ def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> 
             for text in texts
         ]
         kept.append(replace(rule, when=tuple(when[k] for k in needed)))
-    propositions = {proposition for rule in kept for proposition in rule.when}
-    named = {
-        (proposition.variable, t)
-        for proposition in propositions
-        for t in proposition.terms
-    }
-    variables = _pruned_variables(
-        _merged(rules.variables, same), named, removed, drops_inputs=drops_inputs
-    )
-    left = replace(rules, variables=variables, rules=tuple(kept))
-    return Pruned(left, tuple(removed), tuple(numbers))
+    return replace(rules, rules=tuple(kept))
 
 
 def _numbers_left(
     model: Document, dead: Mapping[int, str], removed: list[Removed]
 ) -> list[int]:
     """Return the numbers of the rules that stay: a model of rules needs one."""
-    numbers = [n for n in range(1, len(model.rules) + 1) if n not in dead] or [1]
+    every = range(1, len(model.rules) + 1)
+    numbers = [number for number in every if number not in dead] or [*every[:1]]
     change = "the rules behind it have lower numbers"
     removed += [
         Removed(f"rule {number}", why, change)
@@ -254,9 +259,7 @@ def curve_bytes(curve: object) -> bytes:
     return msgspec.msgpack.encode(curve)
 
 
-def _renamed(
-    proposition: Proposition, same: Mapping[str, Mapping[str, str]]
-) -> Proposition:
+def _renamed(proposition: Proposition, same: _Same) -> Proposition:
     of = same.get(proposition.variable, {})  # none of an output
     if not of.keys() & set(proposition.terms):
         return proposition
@@ -264,9 +267,7 @@ def _renamed(
     return replace(proposition, terms=tuple(names))
 
 
-def _merged(
-    variables: Iterable[Variable], same: Mapping[str, Mapping[str, str]]
-) -> list[Variable]:
+def _merged(variables: Iterable[Variable], same: _Same) -> list[Variable]:
     """Return variables without the terms that others stand in for."""
     return [
         replace(v, terms=tuple(t for t in v.terms if t.name not in same[v.name]))
@@ -274,32 +275,23 @@ def _merged(
     ]
 
 
-def _pruned_variables(
-    variables: Iterable[Variable],
-    named: Collection[tuple[str, str]],
-    removed: list[Removed],
-    *,
-    drops_inputs: bool,
-) -> tuple[Variable, ...]:
-    """Leave out terms that are not named, then variables that are not used."""
-    kept = [replace(v, terms=_named_terms(v, named, removed)) for v in variables]
-    return _used_variables(kept, removed, (), drops_inputs=drops_inputs)
-
-
 def _used_variables(
-    kept: Collection[Variable],
-    removed: list[Removed],
-    used: Collection[str],
-    *,
-    drops_inputs: bool,
+    model: Document, removed: list[Removed], *, drops_inputs: bool
 ) -> tuple[Variable, ...]:
     """Leave out variables without terms that nothing else uses either."""
+    used = {one.variable for one in _tests(model)}
+    every: list[Variable | SystemOutput] = [*model.variables, *model.outputs]
+    for curve in (term.function for variable in every for term in variable.terms):
+        if isinstance(curve, Linear):
+            used.update(model.inputs)  # it has a weight for each
+        elif isinstance(curve, Formula):
+            used.update(names_in(curve.expression))
     gone: set[str] = set()
-    for one, name in _idle_variables(kept, used):
+    for one, name in _idle_variables(model.variables, used):
         if drops_inputs or not one.changes:
             removed.append(one)
             gone.add(name)
-    return tuple(v for v in kept if v.name not in gone)
+    return tuple(v for v in model.variables if v.name not in gone)
 
 
 def _named_terms(
@@ -364,60 +356,47 @@ def cannot_overflow(parts: Iterable[Part]) -> bool:
 # --- fuzzy systems
 
 
-def _pruned_system(
-    system: FuzzySystem, *, drops_inputs: bool, drops_rules: bool
-) -> Pruned:
-    removed: list[Removed] = []
-    dead = never_activated(system) if drops_rules else {}
-    numbers = _numbers_left(system, dead, removed)
-    left = with_rules(system, numbers)
-    same = _stand_ins(system.variables, removed)
+def _reworded_system(system: Document, same: _Same) -> Document:
+    """Return a system whose conditions name the terms that stand in for others."""
     blocks = tuple(
         replace(
             block,
             rules=tuple(replace(r, when=_reworded(r.when, same)) for r in block.rules),
         )
-        for block in left.blocks
+        for block in system.blocks
     )
-    merged = tuple(_merged(system.variables, same))
-    left = with_named_terms(replace(left, variables=merged, blocks=blocks), removed)
-    curves = [term.function for v in left.all_variables for term in v.terms]
-    used = {one.variable for rule in left.rules for one in questions(rule.when)}
-    for curve in curves:
-        if isinstance(curve, Linear):
-            used.update(system.inputs)  # it has a weight for each
-        elif isinstance(curve, Formula):
-            used.update(names_in(curve.expression))
-    variables = _used_variables(
-        left.variables, removed, used, drops_inputs=drops_inputs
-    )
-    left = replace(left, variables=variables)
-    return Pruned(left, tuple(removed), tuple(numbers))
+    return replace(system, blocks=blocks)
 
 
-def with_named_terms(
-    system: FuzzySystem, removed: list[Removed] | None = None
-) -> FuzzySystem:
-    """Return a system without the terms that no rule names, and that are no samples.
+def with_named_terms(model: D, removed: list[Removed] | None = None) -> D:
+    """Return a model without the terms that nothing names, and that are no samples.
 
     Args:
-        system: The system.
+        model: The model.
         removed: Gets what is left out.
     """
     removed = [] if removed is None else removed
-    tests = [one for rule in system.rules for one in questions(rule.when)]
-    named = {(one.variable, term) for one in tests for term in one.terms}
-    named |= {(one.output, one.term) for rule in system.rules for one in rule.then}
+    named = {(n.variable, t) for n in model.nodes for b in n.branches for t in b.terms}
+    named |= {(one.variable, term) for one in {*_tests(model)} for term in one.terms}
+    rules = (rule for block in model.blocks for rule in block.rules)
+    named |= {(one.output, one.term) for rule in rules for one in rule.then}
     outputs = tuple(
         output
         if _has_samples(output)
         else replace(output, terms=_named_terms(output, named, removed))
-        for output in system.outputs
+        for output in model.outputs
     )
     variables = tuple(
-        replace(v, terms=_named_terms(v, named, removed)) for v in system.variables
+        replace(v, terms=_named_terms(v, named, removed)) for v in model.variables
     )
-    return replace(system, variables=variables, outputs=outputs)
+    result: D = replace(model, variables=variables)
+    return replace(result, outputs=outputs) if outputs else result
+
+
+def _tests(model: Document) -> Iterator[Proposition]:
+    """Yield the propositions of all rules."""
+    for rule in model.rules:
+        yield from rule.when if isinstance(rule, Rule) else questions(rule.when)
 
 
 def _has_samples(output: SystemOutput) -> bool:
@@ -427,20 +406,21 @@ def _has_samples(output: SystemOutput) -> bool:
     return not is_weighted and any(isinstance(one, Singleton) for one in curves)
 
 
-def never_activated(system: FuzzySystem) -> dict[int, str]:
+def never_activated(system: Document) -> dict[int, str]:
     """Return the rules that conclude nothing, by number, with the reason.
 
     The grid `lines` joins its lines at every term that is concluded, at degree 0 too.
     """
     drawn = {one.name for one in system.outputs if is_drawn_by_lines(one)}
+    rules = (rule for block in system.blocks for rule in block.rules)
     return {
         number: "its weight is 0"
-        for number, rule in enumerate(system.rules, 1)
+        for number, rule in enumerate(rules, 1)
         if rule.weight == 0.0 and drawn.isdisjoint(one.output for one in rule.then)
     }
 
 
-def with_rules(system: FuzzySystem, numbers: Collection[int]) -> FuzzySystem:
+def with_rules(system: D, numbers: Collection[int]) -> D:
     """Return a system with some of its rules, and the blocks that still have one."""
     order = iter(range(1, len(system.rules) + 1))
     blocks = [
@@ -450,9 +430,7 @@ def with_rules(system: FuzzySystem, numbers: Collection[int]) -> FuzzySystem:
     return replace(system, blocks=tuple(block for block in blocks if block.rules))
 
 
-def _reworded(
-    when: Condition | None, same: Mapping[str, Mapping[str, str]]
-) -> Condition | None:
+def _reworded(when: Condition | None, same: _Same) -> Condition | None:
     """Return a condition that names the terms that stand in for others."""
     match when:
         case None:
@@ -468,14 +446,10 @@ def _reworded(
 # --- trees
 
 
-def _pruned_tree(
-    tree: FuzzyTree, uses: Collection[Use], *, drops_inputs: bool
-) -> Pruned:
-    removed: list[Removed] = []
-    variables = list(tree.variables)
-    if "relative" not in uses:
-        variables = _without_flanks(variables, removed)
-    same = _stand_ins(variables, removed)
+def _reworded_tree(
+    tree: Document, uses: Collection[Use], same: _Same, removed: list[Removed]
+) -> Document:
+    """Return a tree whose branches name the terms and sets that stand for others."""
     sets, same_sets = _pruned_sets(tree, uses, removed)
 
     def left(variable: str, branch: Branch) -> Branch:
@@ -490,11 +464,7 @@ def _pruned_tree(
         replace(node, branches=tuple(left(node.variable, b) for b in node.branches))
         for node in tree.nodes
     )
-    named = {(n.variable, t) for n in nodes for b in n.branches for t in b.terms}
-    merged = _merged(variables, same)
-    kept = _pruned_variables(merged, named, removed, drops_inputs=drops_inputs)
-    model = replace(tree, variables=kept, nodes=nodes, sets=sets)
-    return Pruned(model, tuple(removed))
+    return replace(tree, nodes=nodes, sets=sets)
 
 
 def _without_flanks(
@@ -516,7 +486,7 @@ def _without_flanks(
 
 
 def _pruned_sets(
-    tree: FuzzyTree, uses: Collection[Use], removed: list[Removed]
+    tree: Document, uses: Collection[Use], removed: list[Removed]
 ) -> tuple[tuple[Sets, ...], dict[str, dict[str, str]]]:
     """Return the fitted sets that raw rules need, and which stand in for which."""
     named = {(n.variable, s) for n in tree.nodes for b in n.branches for s in b.sets}
