@@ -112,7 +112,7 @@ def rules_from_tree(
     """Turn each path of a tree into a rule, in the order of the leaves.
 
     Args:
-        tree: The tree.
+        tree: The tree: a model with leaves.
         kind: `relative` for rules that equal the tree on every input; `raw` for the
             paper's rules, whose terms are the fitted sets as they are.
         conjunction: The AND of the rules; the tree's own unless given.
@@ -121,8 +121,7 @@ def rules_from_tree(
         A rule base whose rule k is leaf k, with the variables that the nodes test.
 
     Raises:
-        InvalidModelError: If `kind` is `raw` and the tree carries no sets, or if the
-            model is no tree.
+        InvalidModelError: If `kind` is `raw` and the tree carries no sets.
     """
     if kind == "raw" and tree.nodes and not tree.sets:
         text = f"tree {tree.name!r} carries no fitted sets, so it has no raw rules"

@@ -101,7 +101,7 @@ def audit(
         budget = Budget(int(settings.budget * 1e6), report=report)
         subject = subject_of(viewed, settings, budget, rows, row)
         _answer_all(subject, wanted - left.keys(), answers, cut)
-    kind = getattr(model, "kind", None) or ""
+    kind = model.kind or ""
     is_plain = [*viewed.numbers] == [*range(1, len(viewed.numbers) + 1)]
     words = Words(viewed.domain, model.variables)
     kept = sorted((a for a in answers if a.code in wanted), key=lambda a: a.code)
