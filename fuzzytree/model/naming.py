@@ -78,7 +78,7 @@ def printable_json(text: str) -> str:
 
 
 class NameMap(msgspec.Struct, frozen=True):
-    """A map from the names of a model to names of a target, and back.
+    """A map from the names of a model to names of a target, each to its own.
 
     Attributes:
         accepted: The target's name for each of the model's, in their order.
@@ -118,8 +118,6 @@ class NameMap(msgspec.Struct, frozen=True):
             >>> names = NameMap.of(["fore arm", "fore-arm", "if"], reserved=["IF"])
             >>> list(names.accepted.values())
             ['fore_arm', 'fore_arm_2', 'if_']
-            >>> names.restored("fore_arm_2")
-            'fore-arm'
             >>> list(NameMap.of(["Größe (µm)", "β"]).accepted.values())
             ['Grosse_mum', 'beta']
         """
@@ -155,17 +153,6 @@ class NameMap(msgspec.Struct, frozen=True):
     def __getitem__(self, name: str) -> str:
         """Return the target's name for one of the model's."""
         return self.accepted[name]
-
-    def restored(self, accepted: str) -> str:
-        """Return the model's name for one of the target's.
-
-        Raises:
-            KeyError: If no name became that one.
-        """
-        for name, one in self.accepted.items():
-            if one == accepted:
-                return name
-        raise KeyError(accepted)
 
     @property
     def changed(self) -> dict[str, str]:
