@@ -72,15 +72,15 @@ def model_lines(model: Document) -> Iterator[str]:
 def rule_facts(model: Document) -> list[dict[str, object]]:
     """Return the rules for programs: number, sentence, and class and rows or weight."""
     rules: Rules = rules_of(model).rules
-    return [
-        {"number": number, "text": rule_text(rule)}
-        | (
-            {"class": rule.then, "rows": rule.support}
-            if isinstance(rule, Rule)
-            else {"weight": rule.weight}
-        )
-        for number, rule in enumerate(rules, 1)
-    ]
+    results: list[dict[str, object]] = []
+    for position, rule in enumerate(rules, 1):
+        facts: dict[str, object] = {"number": position, "text": rule_text(rule)}
+        if isinstance(rule, Rule):
+            facts |= {"class": rule.then, "rows": rule.support}
+        else:
+            facts["weight"] = rule.weight
+        results.append(facts)
+    return results
 
 
 def document_text(model: Document) -> str:

@@ -229,6 +229,8 @@ def frames_model(source: Model | PathLike) -> Model:
     """
     model = opened(source)
     if not isinstance(model, FuzzyTree | RuleBase):
-        name = os.fspath(source) if isinstance(source, PathLike) else model.name
+        name = (
+            os.fspath(source) if isinstance(source, str | os.PathLike) else model.name
+        )
         raise TableError(f"{name}: a model of frames is a tree or a rule base")
     return model
