@@ -1,6 +1,8 @@
 from .c import CFile as CFile
 from .c import beginning as beginning
+from .c import fixed_point as fixed_point
 from .c import write_c as write_c
+from .c_fixed import FixedSteps as FixedSteps
 from .c_steps import LIBRARY as LIBRARY
 from .c_steps import CSteps as CSteps
 from .c_text import DOUBLE as DOUBLE

@@ -9,13 +9,13 @@ With a macro it is a program that tests itself.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Literal
+from typing import Literal, cast
 
-from fuzzytree.exporters.c_fixed import Q15, Q31
+from fuzzytree.exporters.c_fixed import Q15, Q31, FixedSteps
 from fuzzytree.exporters.c_rules import probability_code, rules_code
 from fuzzytree.exporters.c_selftest import selftest_code
 from fuzzytree.exporters.c_steps import HELPERS, WORDS
-from fuzzytree.exporters.c_systems import system_file
+from fuzzytree.exporters.c_systems import SystemFile, system_file
 from fuzzytree.exporters.c_tables import CModel
 from fuzzytree.exporters.c_text import (
     DECLARE,
@@ -49,6 +49,7 @@ from fuzzytree.model import (
     FuzzySystem,
     Loss,
     Model,
+    Option,
     Points,
     RuleBase,
     SystemOutput,
@@ -157,18 +158,11 @@ def write_c(
     if tolerance is not None and dtype not in ("q15", "q31"):
         raise ValueError("a tolerance is that of fixed point: dtype=q15 or q31")
     if isinstance(model, FuzzySystem):
-        lost: tuple[Loss, ...] = ()
-        if tolerance is not None:
-            model, lost = pointed(model, tolerance, keeps=_has_lines)
+        file, lost = _system_file(
+            model, dtype, activations=activations, tables=tables, tolerance=tolerance
+        )
         if lost and not allow_loss:
             raise refusal(model.name, f"c {dtype}", lost)
-        file = system_file(
-            model,
-            _NUMBERS[dtype],
-            activations=activations,
-            tables=tables,
-            curves={loss.where: loss.bound or 0.0 for loss in lost},
-        )
         body = "".join(file.text(selftest=selftest))
         text = "".join(_heading(model, source)) + fill(body, prefix)
         return Written(text.encode("ascii"), lost, tuple(file.remarks()))
@@ -183,6 +177,41 @@ def write_c(
         raise narrowing_refusal(model.name, "c float32", lost)
     code = CFile(model, _NUMBERS[dtype], prefix, rated=rated, source=source)
     return Written("".join(code.text(selftest=selftest)).encode("ascii"), lost)
+
+
+def fixed_point(system: Document, options: Mapping[str, Option]) -> FixedSteps:
+    """Return a system as `write_c` has it in fixed point: units and worst errors.
+
+    Raises:
+        ValueError: As `write_c`.
+    """
+    file, _ = _system_file(
+        cast("FuzzySystem", system),
+        str(options["dtype"]),
+        activations=bool(options.get("activations")),
+        tables=bool(options.get("tables")),
+        tolerance=cast("float | None", options.get("tolerance")),
+    )
+    return cast("FixedSteps", file.steps)  # of a type of whole numbers
+
+
+def _system_file(
+    system: FuzzySystem,
+    dtype: str,
+    *,
+    activations: bool,
+    tables: bool,
+    tolerance: float | None,
+) -> tuple[SystemFile, tuple[Loss, ...]]:
+    lost: tuple[Loss, ...] = ()
+    if tolerance is not None:
+        system, lost = pointed(system, tolerance, keeps=_has_lines)
+    curves = {loss.where: loss.bound or 0.0 for loss in lost}
+    numbers = _NUMBERS[dtype]
+    file = system_file(
+        system, numbers, activations=activations, tables=tables, curves=curves
+    )
+    return file, lost
 
 
 def beginning(own: str, name: str | None) -> str:

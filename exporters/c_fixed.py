@@ -88,6 +88,8 @@ class FixedSteps(CSteps):
     Attributes:
         bits: Behind the point, of each step.
         worst: The worst errors of its results, those of curves included.
+        input_units: What an input is multiplied by, of shape (inputs, 1).
+        output_units: The same of outputs, of shape (outputs, 1).
 
     Raises:
         ValueError: If a step has no range or bound, or is none of whole numbers.
@@ -119,6 +121,21 @@ class FixedSteps(CSteps):
                     "rounded number may decide a choice or divide by 0; take float32"
                 )
         super().__init__(program, numbers, {}, tables=tables)
+        self.input_units, self.output_units = (
+            2.0 ** np.array(bits).reshape(-1, 1) for bits in self._end_bits()
+        )
+
+    def whole_inputs(self, values: FloatArray) -> FloatArray:
+        """Return the nearest whole numbers that the file distinguishes.
+
+        `values` and what is returned have shape (inputs, rows); a missing value is the
+        low end of its range.
+        """
+        ends = np.array(self.ranges).reshape(-1, 2)
+        low, high = np.trunc(ends * self.input_units)[:, :, np.newaxis].swapaxes(0, 1)
+        with np.errstate(over="ignore"):
+            whole: FloatArray = np.clip(np.rint(values * self.input_units), low, high)
+        return np.where(np.isnan(whole), low, whole) + 0.0  # sums have no -0
 
     def scales(self) -> Iterator[str]:
         """Yield of how many bits behind the point inputs and outputs are, in words."""
@@ -131,13 +148,12 @@ class FixedSteps(CSteps):
 
     def examples(self, rows: Sequence[Sequence[float]]) -> Iterator[SystemExample]:
         """Yield examples in whole numbers, as they stand in the file."""
-        scales, units = (2.0 ** np.array(bits) for bits in self._end_bits())
-        low, high = np.array(self.ranges).reshape(-1, 2).T
+        units = self.output_units[:, 0]
         errors = (np.ceil(self.whole_worst.errors[:-1] * units) + 1.0).tolist()
-        for row in rows:
-            inside = np.clip(np.where(np.isfinite(row), row, low), low, high)
-            line = np.trunc(inside * scales) + 0.0  # sums have no -0
-            values = dict(zip(self.program.inputs, line / scales, strict=True))
+        wholes = self.whole_inputs(np.array(rows).reshape(len(rows), -1).T).T
+        for line in wholes:
+            inputs = (line / self.input_units[:, 0]).tolist()
+            values = dict(zip(self.program.inputs, inputs, strict=True))
             *outputs, status = evaluate_program(self.program, values).values
             numbers = tuple((np.round(outputs * units) + 0.0).tolist())
             yield line.tolist(), numbers, errors, int(status)

@@ -15,6 +15,7 @@ import numpy as np
 
 from fuzzytree.checking.comparing import (
     OTHER_FUNCTION,
+    Allow,
     Finding,
     ModelRun,
     RowSet,
@@ -27,9 +28,9 @@ from fuzzytree.checking.comparing import (
     within,
 )
 from fuzzytree.checking.equivalence import is_equivalent, with_points_once
-from fuzzytree.checking.subject import Subject, rounding
+from fuzzytree.checking.subject import Subject, fixed_errors, rounding
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.exporters import find_format, stated_options
+from fuzzytree.exporters import find_format, fixed_point, stated_options
 from fuzzytree.model import (
     Comparison,
     Conjunction,
@@ -114,14 +115,16 @@ def _compare_answers(
     dtype: Dtype,
     rows: RowSet,
     *,
+    allow: Allow | None = None,
     with_results: bool = True,
 ) -> Iterator[Comparison]:
     """Compare what a file answers with the native runtime, then its labels.
 
-    It has the bits of its number type. If that cannot hold the model without loss, it
-    is compared with double, within what rounding can change.
+    It has the bits of its number type, unless another bound is given. If the type
+    cannot hold the model without loss, it is compared with double, within what rounding
+    can change.
     """
-    allow = subject.exactly(model)
+    allow = subject.exactly(model) if allow is None else allow
     if model.outputs and dtype != "float64":
         allow, dtype = rounding(model, dtype), "float64"
     try:
@@ -500,9 +503,6 @@ def _why_not(text: _Text, form: Format) -> str | None:
         return "only JavaScript modules are run"
     if text.options.get("keep"):
         return "a query runs here if it gives the inputs, and no other columns"
-    dtype = text.options.get("dtype", "float64")
-    if text.form.outputs and dtype not in ("float64", "float32"):
-        return f"fixed point such as {dtype} is not compared here"
     if text.options.get("curves") == "points":
         return "PMML whose curves became points is another function"
     return None
@@ -516,8 +516,16 @@ def _run(
     Raises:
         MissingExtraError: If an engine is missing.
     """
-    rows, model = subject.rows, text.form
-    dtype: Dtype = "float32" if text.options.get("dtype") == "float32" else "float64"
+    rows, model, allow = subject.rows, text.form, None
+    total, stated = len(rows.numbers), text.options.get("dtype")
+    dtype: Dtype = "float32" if stated == "float32" else "float64"
+    if stated == "q15" or stated == "q31":
+        fixed = fixed_point(model, text.options)
+        rows = rows.part(np.flatnonzero(~np.isnan(rows.values).any(axis=0)))
+        values = fixed.whole_inputs(rows.values) / fixed.input_units
+        rows, allow = msgspec.structs.replace(rows, values=values), fixed_errors(fixed)
+        if count := total - len(rows.numbers):
+            yield f"{title}: {count} of {total} rows; fixed point has no missing values"
     if model.outputs and dtype == "float32":
         with np.errstate(over="ignore"):  # it is missing in that type
             single = rows.values.astype(np.float32).astype(np.float64)
@@ -525,7 +533,7 @@ def _run(
     if program.format == "sql":
         rows = _table_rows(model, rows)
     if program.format != "c":
-        total, rows = len(rows.numbers), rows.share(_MOST_ROWS)
+        rows = rows.share(_MOST_ROWS)
         if len(rows.numbers) < total:
             count = len(rows.numbers)
             yield f"{title}: {total - count} of {total} rows; {count} others were run"
@@ -538,7 +546,7 @@ def _run(
         faults = ("; ".join(str(error).splitlines()),)
         yield counted("rows", title, "the model", len(rows.numbers), faults)
         return
-    yield from _compare_answers(subject, title, result, model, dtype, rows)
+    yield from _compare_answers(subject, title, result, model, dtype, rows, allow=allow)
 
 
 def _table_rows(model: Document, rows: RowSet) -> RowSet:

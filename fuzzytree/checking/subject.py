@@ -9,6 +9,7 @@ differ by what rounding can change, and a runtime with a bound of its own by tha
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Iterator, Sequence
 from typing import cast, get_args
 
@@ -30,6 +31,7 @@ from fuzzytree.checking.comparing import (
     within,
 )
 from fuzzytree.errors import LossError
+from fuzzytree.exporters import FixedSteps
 from fuzzytree.model import (
     MOST_PROBES,
     MOST_SYSTEM_PROBES,
@@ -262,6 +264,16 @@ def rounding(model: Document, dtype: Dtype) -> Allow:
         return amounts + strength_bounds(rules, "float64", values)[0], origin
 
     return within(bounds)
+
+
+def fixed_errors(fixed: FixedSteps) -> Allow:
+    """Allow the worst errors that a file in fixed point states of each result."""
+
+    def bounds(program: Program, values: FloatArray) -> FloatArray:
+        return np.tile(fixed.worst.errors.reshape(-1, 1), values.shape[1])
+
+    cause = "the worst error of its whole numbers, for inputs in their ranges"
+    return by_libraries(lambda: fixed.program, bounds, cause, edge=math.inf)
 
 
 # --- trees

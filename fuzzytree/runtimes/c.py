@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.exporters import write_c
+from fuzzytree.exporters import FixedSteps, write_c
 from fuzzytree.model import (
     Document,
     FloatArray,
@@ -105,11 +105,13 @@ def load_content(
     *,
     prefix: str = "model",
     with_strengths: bool = True,
+    fixed: FixedSteps | None = None,
 ) -> Run:
     """Return the same for a file that `fuzzytree.exporters.c` wrote of a model.
 
     `prefix` is the beginning of all names in the file, which gives the activations of a
-    system if `with_strengths`.
+    system if `with_strengths`. Of a file that is `fixed`, values become the nearest
+    that it has.
 
     Raises:
         MissingExtraError: As `load`.
@@ -125,10 +127,11 @@ def load_content(
     loop = loop.replace("model_", f"{prefix}_").replace("MODEL_", f"{prefix.upper()}_")
     is_long = bool(model.outputs) and len(content) > _LONG
     answer = compiled(content, loop, 4, "-O0" if is_long else "-O2", f"{prefix}_many")
-    real = np.dtype(dtype)
+    real = np.dtype(fixed.fixed.kind if fixed else dtype)
 
     def run(values: FloatArray) -> Outcome:
         array = checked(values, model.inputs)
+        array = fixed.whole_inputs(array) if fixed else array
         with np.errstate(over="ignore"):  # what float32 cannot hold is missing
             inputs = np.ascontiguousarray(array, real)
         rows = array.shape[1]
@@ -136,6 +139,7 @@ def load_content(
         made = np.empty(count, real) if count else None
         numbers = np.empty((count, rows), np.float64)
         answer(_at(inputs), rows, *map(_at, (rule, status, made, numbers)))
+        numbers /= fixed.output_units if fixed else 1.0
         outputs, strengths = np.split(numbers, [len(model.outputs)])
         return Outcome(
             rule,

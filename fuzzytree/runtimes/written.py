@@ -24,7 +24,7 @@ import numpy as np
 
 from fuzzytree.columns import BOOLEANS
 from fuzzytree.errors import FuzzyTreeError, MissingExtraError
-from fuzzytree.exporters import beginning
+from fuzzytree.exporters import beginning, fixed_point
 from fuzzytree.model import (
     Document,
     FloatArray,
@@ -160,17 +160,19 @@ def _is_rated(options: Options) -> bool:
     return options.get("probabilities") is True
 
 
-def _c_type(options: Options) -> c.Dtype:
-    return "float32" if options.get("dtype") == "float32" else "float64"
-
-
 def _c(
     content: bytes, model: Document, options: Options, values: FloatArray
 ) -> ProgramOutcome:
-    dtype, name = _c_type(options), cast("str | None", options.get("name"))
-    is_fired = not model.outputs or options.get("activations") is True
-    prefix = beginning(model.name, name)
-    run = c.load_content(content, model, dtype, prefix=prefix, with_strengths=is_fired)
+    dtype = options.get("dtype", "float64")
+    is_fixed = dtype not in ("float64", "float32")
+    run = c.load_content(
+        content,
+        model,
+        cast("c.Dtype", dtype),
+        prefix=beginning(model.name, cast("str | None", options.get("name"))),
+        with_strengths=not model.outputs or options.get("activations") is True,
+        fixed=fixed_point(model, options) if is_fixed else None,
+    )
     return ProgramOutcome(run(values), None)
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -26,6 +28,7 @@ from fuzzytree.runtimes import written
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree
+from tests.interop.matrix_models import write_model
 
 TREE = random_tree(3, leaves=6, inputs=3)
 RULES = rules_from_tree(TREE, "raw", conjunction="product")
@@ -432,3 +435,75 @@ def test_a_wrong_number_in_float32_is_noticed_beyond_its_bound() -> None:
         Path("m.c").write_text(text.replace(right, wrong), "utf-8")
         agreement = checked(system, "m.c", run_code=True)
         assert about(agreement, "m.c")[1] == ("native", verdict)
+
+
+def in_fixed_point(system: Document, **options: Any) -> str:
+    """Write a system as C in fixed point, and return the bound that it states."""
+    ft.save(system, "m.c", selftest=False, **options)
+    bound = re.search(r"is within (\S+) of exact", Path("m.c").read_text("utf-8"))
+    assert bound is not None
+    return bound[1]
+
+
+@pytest.mark.parametrize("dtype", ["q15", "q31"])
+@pytest.mark.parametrize("options", [{}, {"activations": True, "name": "other"}])
+def test_fixed_point_is_run_on_its_own_inputs_and_agrees_within_its_bound(
+    dtype: str, options: dict[str, Any]
+) -> None:
+    system = ft.load(write_model("mamdani"))
+    bound = in_fixed_point(system, dtype=dtype, **options)
+    data = np.array([[np.inf, -9.0, np.nan, 3.3333], [1e308, 7.77777, 1.0, -0.0]])
+    agreement = ft.check(system, "m.c", data=data.T, runtimes=["native"])
+    rows = next(c for c in agreement.comparisons if (c.basis, c.rows) == ("rows", 2001))
+    assert agreement.ok
+    assert agreement.unchecked == ()
+    assert agreement.files == (FileContent("m.c", "system", dtype),)
+    assert (rows.representation, rows.against) == ("m.c", "native")
+    assert rows.origin.startswith(
+        "the worst error of its whole numbers, for inputs in their ranges; equal bits"
+    )
+    assert 0.0 < rows.largest_difference <= rows.allowed <= float(bound)
+    assert rows.unbounded == rows.flips == 0
+    assert "m.c: 3 of 2004 rows; fixed point has no missing values" in agreement.skipped
+
+
+def test_fixed_point_whose_ranges_begin_away_from_zero_agrees() -> None:
+    system = all_samples()["a conclusion without a condition"]
+    variables = [
+        replace(one, low=-0.3 - place, high=4.1)
+        for place, one in enumerate(system.variables)
+    ]
+    system = replace(system, variables=tuple(variables))
+    in_fixed_point(system, dtype="q15")
+    agreement = checked(system, "m.c")
+    assert about(agreement, "m.c") == [
+        ("a freshly written file", "agrees"),
+        ("native", "agrees"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("dtype", "right", "wrong", "fault"),
+    [
+        ("q15", "- (24576)", "- (20000)", "output 'z' "),
+        ("q31", "- (1610612736)", "- (1610600000)", "output 'z' "),
+        ("q31", "return (int)(", "return 2 + (int)(", "status uncovered where decided"),
+    ],
+)
+def test_a_wrong_number_in_fixed_point_is_noticed(
+    dtype: str, right: str, wrong: str, fault: str
+) -> None:
+    system = ft.load(write_model("mamdani"))
+    in_fixed_point(system, dtype=dtype)
+    text = Path("m.c").read_text("utf-8")
+    assert text.count(right) == 1
+    Path("m.c").write_text(text.replace(right, wrong), "utf-8")
+    assert not checked(system, "m.c").ok
+    agreement = checked(system, "m.c", run_code=True)
+    rows = next(
+        c
+        for c in agreement.comparisons
+        if (c.representation, c.basis) == ("m.c", "rows")
+    )
+    assert (rows.against, rows.verdict) == ("native", "DISAGREES")
+    assert fault in " ".join(rows.detail)

@@ -17,6 +17,7 @@ from fuzzytree.errors import DisagreementError
 from fuzzytree.model.agreement import Agreement, Certified, Comparison
 from fuzzytree.report.text import agreement_lines
 from tests.cli.conftest import Call, grip
+from tests.interop.matrix_models import write_model
 
 NATIVE = ("--runtime", "native", "--generate", "200")
 
@@ -209,3 +210,15 @@ def test_a_program_is_run_only_if_it_is_the_one_that_is_written_now(
     assert code == 1
     assert "in 1 file only the rows agree, which --rows-only accepts (" in out
     assert call(*words, "--run-code", "--rows-only")[0] == 0
+
+
+def test_fixed_point_fails_by_a_changed_constant(call: Call) -> None:
+    model = write_model("mamdani")
+    assert call("convert", model, "m.c", "--set", "dtype=q15")[0] == 0
+    code, out, _ = call("check", model, "m.c", *NATIVE)
+    assert (code, "not checked" in out) == (0, False)
+    text = Path("m.c").read_text("utf-8")
+    Path("m.c").write_text(text.replace("- (24576)", "- (20000)"), "utf-8")
+    code, out, _ = call("check", model, "m.c", *NATIVE, "--run-code", "--rows-only")
+    assert code == 1
+    assert "output 'z' " in out
