@@ -497,7 +497,13 @@ def bench(
 
 
 def _model_of(model: ModelSource, verb: str) -> Model:
-    return checking.deciding(checking.as_model(model), verb)
+    decider = checking.as_model(model)
+    if decider.outputs:
+        raise ReadError(
+            f"{decider.name} is a fuzzy system, which decides for no class; "
+            f"{verb} takes a tree or a rule base"
+        )
+    return cast("Model", decider)
 
 
 def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:

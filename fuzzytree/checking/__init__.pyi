@@ -10,15 +10,12 @@ from .comparing import judged as judged
 from .comparing import labels as labels
 from .comparing import row_set as row_set
 from .conformance import failures as failures
-from .converting import CALLED as CALLED
 from .converting import Conversion as Conversion
 from .converting import Proof as Proof
 from .converting import as_model as as_model
 from .converting import convert as convert
-from .converting import deciding as deciding
 from .converting import export as export
 from .converting import format_of as format_of
-from .converting import formed as formed
 from .converting import in_dialect as in_dialect
 from .converting import load as load
 from .converting import load_content as load_content
@@ -34,6 +31,8 @@ from .dependencies import needs as needs
 from .dependencies import prove as prove
 from .dependencies import sizes_of as sizes_of
 from .files import ProgramFile as ProgramFile
+from .kinds import CALLED as CALLED
+from .kinds import formed as formed
 from .representations import check as check
 from .stability.results import Criterion as Criterion
 from .stability.results import Move as Move

@@ -7,8 +7,8 @@ from typing import Literal, cast
 
 import msgspec
 
-from fuzzytree.checking.converting import formed
 from fuzzytree.checking.equivalence import equivalence
+from fuzzytree.checking.kinds import formed
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.model import Document, Format, Written, kind_of, options_of
 from fuzzytree.semantics import all_samples

@@ -5,33 +5,32 @@ from __future__ import annotations
 import functools
 import inspect
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import msgspec
 
 from fuzzytree.checking.equivalence import equivalence
+from fuzzytree.checking.kinds import CALLED, formed, refuse_other_kind
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded
 from fuzzytree.formats import from_simpful, from_skfuzzy, from_sklearn
 from fuzzytree.model import (
     Conjunction,
+    Coverage,
     Document,
     Dtype,
     Format,
     FuzzySystem,
-    FuzzyTree,
     Kind,
-    Loss,
     Model,
     ModelKind,
     ModelPath,
     ModelSource,
     Option,
     Reading,
-    RuleBase,
     Written,
     check_options,
     kind_of,
@@ -41,28 +40,18 @@ from fuzzytree.model import (
 )
 from fuzzytree.semantics import (
     check_tolerance,
-    evaluate,
-    probes,
-    rules_from_tree,
+    probe_values,
     unsampled_terms,
 )
 from fuzzytree.tables import SUFFIXES
 
 if TYPE_CHECKING:
-    from fuzzytree.model import Coverage
     from fuzzytree.numerics import Certificate
 
 _FEW = 200  # probes of a file that is run
 _TRIED = 1000  # probes of what a loss does to decisions
 
 _NOT_READ = "the file is not read back here; other programs run it"
-
-CALLED: dict[ModelKind, str] = {
-    "tree": "tree",
-    "rules": "rule base",
-    "system": "fuzzy system",
-}
-"""What people call each representation."""
 
 
 class Proof(msgspec.Struct, frozen=True):
@@ -225,8 +214,7 @@ def load(
         format: As in `read`.
 
     Raises:
-        ReadError: If the file cannot be read, or says something wrong; the message
-            lists all mistakes with their lines.
+        ReadError: As `read`.
         LossError: If the model cannot hold all that the file says, unless allowed;
             the message lists all losses.
         ValueError: If there is no such format.
@@ -295,152 +283,12 @@ def _whole(reading: Reading, name: str, *, allow_loss: bool) -> Document:
         LossError: If the model cannot hold all of it, unless allowed.
     """
     if reading.losses and not allow_loss:
-        raise LossError(losses_text(reading.losses, name))
+        listed = "\n".join(f"  {loss_text(loss)}" for loss in reading.losses)
+        raise LossError(
+            f"{name}: a model cannot hold all that the file says:\n{listed}\n"
+            "  pass allow_loss=True to read it as stated"
+        )
     return reading.model
-
-
-def deciding(model: Document, verb: str) -> Model:
-    """Return a model that decides for a class, as some verbs need.
-
-    Args:
-        model: Any model.
-        verb: What needs it.
-
-    Raises:
-        ReadError: If it is a fuzzy system, whose outputs are numbers.
-    """
-    if model.outputs:
-        raise ReadError(
-            f"{model.name} is a fuzzy system, which decides for no class; "
-            f"{verb} takes a tree or a rule base"
-        )
-    return cast("Model", model)
-
-
-def losses_text(losses: Sequence[Loss], name: str) -> str:
-    """Return a message that lists what a model cannot hold of a file."""
-    listed = "\n".join(f"  {loss_text(loss)}" for loss in losses)
-    return (
-        f"{name}: a model cannot hold all that the file says:\n{listed}\n"
-        "  pass allow_loss=True to read it as stated"
-    )
-
-
-def formed(
-    model: Document,
-    form: Format,
-    *,
-    representation: ModelKind | None = None,
-    kind: Kind | None = None,
-    conjunction: Conjunction | None = None,
-) -> Document:
-    """Return a model in the wanted form, or in one that a format carries.
-
-    Without options a model stays what it is. Where the format does not carry
-    that, a tree becomes rules, rules become the system that decides alike, and a
-    system that decides as rules do becomes those rules.
-
-    Args:
-        model: A tree, a rule base or a system.
-        form: The format that it goes to.
-        representation: What it shall be.
-        kind: The terms of rules made from a tree; relative unless given.
-        conjunction: The AND of rules made from a tree.
-
-    Raises:
-        LossError: If the format does not carry it in any form.
-        ValueError: If the model has no such form.
-    """
-    if not isinstance(model, FuzzyTree):
-        _refuse_remaking(model, representation, kind, conjunction)
-    else:
-        usual = "rules" if kind or conjunction else _nearest("tree", form)
-        if (representation or usual) == "tree":
-            return model
-        model = rules_from_tree(model, kind or "relative", conjunction=conjunction)
-    wanted = representation or _nearest(kind_of(model), form)
-    if wanted == kind_of(model):
-        return model
-    from fuzzytree.semantics import as_rules, as_system
-
-    if not model.outputs:
-        return as_system(cast("RuleBase", model), scores="winner")
-    rules = as_rules(cast("FuzzySystem", model), None)
-    if rules is not None:
-        return rules
-    if representation == "rules":
-        raise ValueError(
-            f"as rules: {model.name} is a fuzzy system whose outputs are numbers, "
-            "and no rules that decide for a class can be made of it"
-        )
-    raise LossError(
-        f"cannot write {model.name} as {form.name}: it carries "
-        f"{' or '.join(form.carries)}, and this is a fuzzy system whose outputs "
-        f"are numbers; {', '.join(_representations('system'))} carry one"
-    )
-
-
-def _way_out(representation: ModelKind, form: Format) -> str:
-    """Return what to do with a model that a format does not carry."""
-    nearest = _nearest(representation, form)
-    if nearest != representation:
-        return f"fuzzytree.convert makes {_FEW_OF[nearest]} of it"
-    return f"{', '.join(_representations(representation))} carry one"
-
-
-_FEW_OF: dict[ModelKind, str] = {
-    "tree": "a tree",
-    "rules": "rules",
-    "system": "a fuzzy system",
-}
-
-
-def _representations(representation: ModelKind) -> list[str]:
-    """Return the names of the formats that carry a kind of model."""
-    return [form.name for form in all_formats() if representation in form.carries]
-
-
-_FORMS: dict[ModelKind, tuple[ModelKind, ...]] = {
-    "tree": ("tree", "rules", "system"),
-    "rules": ("rules", "system"),
-    "system": ("system", "rules"),
-}
-"""What each kind of model can be turned into, the nearest first."""
-
-
-def _nearest(representation: ModelKind, form: Format) -> ModelKind:
-    """Return the nearest kind of model that a format carries, or else the same."""
-    for one in _FORMS[representation]:
-        if one in form.carries:
-            return one
-    return representation
-
-
-def _refuse_remaking(
-    model: RuleBase | FuzzySystem,
-    representation: ModelKind | None,
-    kind: Kind | None,
-    conjunction: Conjunction | None,
-) -> None:
-    """Refuse what can be made of a tree alone, unless the model is of that form.
-
-    Raises:
-        ValueError: If it is not.
-    """
-    what = f"{model.name} is a {CALLED[kind_of(model)]}"
-    if representation == "tree":
-        raise ValueError(f"as tree: {what}, and no tree can be made of it")
-    own: dict[str, str | None] = {}
-    why = "; such rules are made from a tree"
-    if not model.outputs:
-        rules = cast("RuleBase", model)
-        own = {"terms": rules.kind, "conjunction": rules.semantics.conjunction}
-    for option, wanted in (("terms", kind), ("conjunction", conjunction)):
-        if wanted is not None and wanted != own.get(option):
-            if own:
-                noun = own[option] or "other"
-                why = f" with {noun}; other rules are made from the tree"
-            raise ValueError(f"{option} {wanted}: {what}{why}")
 
 
 def export(
@@ -468,13 +316,7 @@ def export(
     """
     model = as_model(model, allow_loss=allow_loss)
     form = find_format(to)
-    representation = kind_of(model)
-    if representation not in form.carries:
-        carried = " or ".join(form.carries)
-        raise LossError(
-            f"cannot write {model.name} as {form.name}: it carries {carried}, "
-            f"and this is a {CALLED[representation]}; {_way_out(representation, form)}"
-        )
+    refuse_other_kind(model, form)
     check_options(form, options)
     if isinstance(tolerance := options.get("tolerance"), int | float):
         check_tolerance(tolerance)
@@ -515,9 +357,8 @@ def _proved(model: Document, form: Format, written: Written, *, dtype: object) -
     if form.read is None:
         if form.dtype is None or model.outputs:
             return Proof("unproved", _NOT_READ)
-        wanted = [name for name in get_args(Dtype) if name in (dtype, form.dtype)]
-        known = dtype if dtype in wanted else wanted[0]
-        facts = certify(cast("Model", model), cast("Dtype", known), None)
+        chosen = dtype if dtype in get_args(Dtype) else form.dtype
+        facts = certify(cast("Model", model), cast("Dtype", chosen), None)
         return Proof("certified", facts.sentence, facts)
     try:
         again = form.read(written.content, form.name)
@@ -551,12 +392,14 @@ def _decided(model: Document, other: Document) -> str:
         return ""
     if len(model.rules) != len(other.rules) or model.inputs != other.inputs:
         return ""
-    one, two = cast("RuleBase", model), cast("RuleBase", other)
-    rows = probes(one, limit=_TRIED)
-    changed = [r for r in rows if evaluate(one, r).rule != evaluate(two, r).rule]
-    if changed:
-        return f"; another rule wins in {len(changed)} of {len(rows)} generated rows"
-    return f"; the same rule wins in all of {len(rows)} generated rows"
+    from fuzzytree.runtimes import baseline
+
+    rows = probe_values(model, _TRIED)
+    one, two = (baseline().load(each)(rows).rule for each in (model, other))
+    count, size = int((one != two).sum()), rows.shape[1]
+    if count:
+        return f"; another rule wins in {count} of {size} generated rows"
+    return f"; the same rule wins in all of {size} generated rows"
 
 
 def in_dialect(
@@ -639,10 +482,8 @@ def convert(
     else:
         reading = Reading(as_model(source))
     name = name or reading.model.name
-    if reading.losses and not allow_loss:
-        raise LossError(losses_text(reading.losses, name))
     model = formed(
-        reading.model,
+        _whole(reading, name, allow_loss=allow_loss),
         form,
         representation=representation,
         kind=terms,

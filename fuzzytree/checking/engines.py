@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 from msgspec.structs import replace
@@ -26,9 +27,9 @@ def with_answers(reading: Reading, read: Callable[..., Reading]) -> Reading:
         reading: What was read of a file that names no dialect.
         read: Reads the same file in another `dialect`.
     """
-    system = reading.model
-    if not isinstance(system, FuzzySystem):
+    if not reading.model.outputs:
         return reading
+    system = cast("FuzzySystem", reading.model)
     losses, remarks = list(reading.losses), list(reading.remarks)
     values = _values(system)
     answers = _outputs(system, values)
@@ -37,8 +38,8 @@ def with_answers(reading: Reading, read: Callable[..., Reading]) -> Reading:
             rival = read(dialect=dialect)
         except ReadError:
             continue  # that engine refuses the file
-        other = rival.model
-        if not isinstance(other, FuzzySystem) or other == system:
+        other = cast("FuzzySystem", rival.model)  # of the same file
+        if other == system:
             continue
         sampled = [
             replace(theirs, defuzzifier=ours.defuzzifier)

@@ -109,13 +109,12 @@ class Subject:
         self.cells: int | None = None
         self.coverage: Coverage | None = None
         self.noun = self.base = "the model"
-        self.forms: dict[str, Document]
-        if isinstance(model, FuzzySystem):
+        self.forms: dict[str, Document] = dict(forms(model).items())
+        if model.outputs:
             self.noun, self.base = "the system", baseline().name
-            self.forms = {"system": model}
-            probes, self.coverage = _aimed_probes(model, limit or MOST_SYSTEM_PROBES)
+            system = cast("FuzzySystem", model)
+            probes, self.coverage = _aimed_probes(system, limit or MOST_SYSTEM_PROBES)
         else:
-            self.forms = dict(forms(model).items())
             if not model.rules:
                 self.tree = cast("FuzzyTree", model)
                 self.cells = semantics.cell_count(self.tree)

@@ -17,8 +17,8 @@ from sklearn import datasets
 from sklearn.tree import DecisionTreeClassifier
 
 from fuzzytree import from_sklearn
+from fuzzytree.checking import export, formed
 from fuzzytree.checking.abilities import MEANINGS, Ability, abilities_of, dialects_of
-from fuzzytree.checking.converting import export, formed
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.table import TABLE, all_formats, find_format
 from fuzzytree.learning import learn_arrays

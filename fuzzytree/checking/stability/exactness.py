@@ -22,7 +22,6 @@ from fuzzytree.checking.stability.runs import (
     Truth,
     exact_check,
     first_line,
-    forms_of,
     loaded_form,
     loaded_forms,
     other_bits,
@@ -52,7 +51,7 @@ from fuzzytree.model import (
     Variable,
 )
 from fuzzytree.runtimes import definition
-from fuzzytree.semantics import landmarks_of, neighbours, probe_values
+from fuzzytree.semantics import forms, landmarks_of, neighbours, probe_values
 
 _ADVICE = (
     "the runtime computes something else, or in another number type than it says; "
@@ -129,7 +128,7 @@ def offsets(
     rows = data[:, :: max(-(-data.shape[1] // _DATA), 1)]
     chosen = [runtime for runtime in runtimes if runtime.bound is None]
     refused: set[str] = set()  # the first distance at which a type gives up is enough
-    for representation, form in forms_of(model).items():
+    for representation, form in forms(model).items():
         for ratio in RATIOS:
             steps = {
                 name: one.spread / ratio - (0.5 * one.low + 0.5 * one.high)
@@ -167,7 +166,7 @@ def offsets(
                 faults = (f"{where}: {fault}" for fault in check.faults)
                 trial.add(check.rows, *faults, worst=check.worst)
                 checks.append((check, runtime.dtype))
-            if ratio in _REPORTED and representation != "tree":
+            if ratio in _REPORTED and form.rules:
                 where = f"{representation}, spread over distance {ratio:.0e}"
                 facts += (f"{where}: {cost}" for cost in _costs(checks))
     return trial.result(*facts)
@@ -293,7 +292,7 @@ def _try_terms(
     `title` names the terms of a form, with `{}` for its name; `change` gives what is
     tested in place of each membership function.
     """
-    for representation, form in forms_of(model).items():
+    for representation, form in forms(model).items():
         terms = term_probes(form, change)
         if terms is None:
             continue

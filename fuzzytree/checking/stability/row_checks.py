@@ -18,7 +18,6 @@ from fuzzytree.checking.stability.runs import (
     LoadedForm,
     exact_check,
     first_line,
-    forms_of,
     loaded_form,
     loaded_forms,
     missing_rows,
@@ -43,7 +42,7 @@ from fuzzytree.model import (
     options_of,
 )
 from fuzzytree.runtimes import baseline, load_content, open_onnx
-from fuzzytree.semantics import SPECIAL, Status
+from fuzzytree.semantics import SPECIAL, Status, forms
 
 BATCHES = (1, 7, 33, 1000)
 """Rows answered at a time."""
@@ -323,7 +322,7 @@ def roundtrips(
     The values, of shape (inputs, rows), are what files that run compute.
     """
     trial = Trial("N9", _ADVICE_FILES, worst=0.0)
-    for representation, form in forms_of(model).items():
+    for representation, form in forms(model).items():
         for one in formats:
             title = f"{one.name}: {representation}"
             if kind_of(form) not in one.carries:

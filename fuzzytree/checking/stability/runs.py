@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import msgspec
 import numpy as np
@@ -25,7 +25,7 @@ from fuzzytree.model import (
     Document,
     Dtype,
     FloatArray,
-    FuzzySystem,
+    Model,
     Outcome,
     Run,
     Runtime,
@@ -47,13 +47,6 @@ _EDGE = 1e-6  # share of an output's range; a wider bound says little
 
 Truth = Decisions | Outcome
 """What is right for some rows: exact decisions, or the numbers of a system."""
-
-
-def forms_of(model: Document) -> dict[str, Document]:
-    """Return what can be made of a model, by the name that people call it."""
-    if isinstance(model, FuzzySystem):
-        return {"system": model}
-    return dict(forms(model).items())
 
 
 def share(values: FloatArray) -> slice:
@@ -102,7 +95,7 @@ def loaded_forms(
 
     `skipped` gets a sentence for each that is not installed or cannot.
     """
-    for representation, form in forms_of(model).items():
+    for representation, form in forms(model).items():
         for runtime in runtimes:
             loaded = loaded_form(representation, form, runtime, skipped)
             if loaded is not None:
@@ -185,8 +178,8 @@ def truth(model: Document, values: FloatArray) -> Truth:
     The numbers of a system are those of its definition on a share of the rows, and
     the native ones, which are compared with it there, on the others.
     """
-    if not isinstance(model, FuzzySystem):
-        return decide(model, values)
+    if not model.outputs:
+        return decide(cast("Model", model), values)
     right, some = baseline().load(model)(values), share(values)
     inferred = definition().load(model)(values[:, some])
     arrays = msgspec.structs.asdict(right)

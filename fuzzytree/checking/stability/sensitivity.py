@@ -23,7 +23,7 @@ from fuzzytree.checking.stability.results import (
     Stiff,
     Trial,
 )
-from fuzzytree.checking.stability.runs import forms_of, output_spans, row_text
+from fuzzytree.checking.stability.runs import output_spans, row_text
 from fuzzytree.model import (
     LR,
     Band,
@@ -38,7 +38,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.numerics import UNIT, Conduct, conduct, degree_bound
 from fuzzytree.runtimes import baseline
-from fuzzytree.semantics import jet, landmarks_of
+from fuzzytree.semantics import forms, jet, landmarks_of
 
 SAFE = 1e-4
 """The error of a degree, or of an output as a share of its range, that is safe."""
@@ -73,7 +73,7 @@ def stiffness(
     """
     scales = input_scales(model, values)
     near = _near(model, values[:, :: max(-(-values.shape[1] // _ROWS), 1)], scales)
-    every = [form for form in forms_of(model).values() if form.rules]
+    every = [form for form in forms(model).values() if form.rules]
     runs = [baseline().load(form) for form in every]
     answers = [run(near) for run in runs]
 
@@ -158,7 +158,7 @@ def input_scales(model: Document, values: FloatArray) -> dict[str, InputScale]:
     slopes: dict[str, list[float]] = {name: [] for name in model.inputs}
     places: dict[str, list[float]] = {name: [] for name in model.inputs}
     curves = dict.fromkeys(model.inputs, 0.0)
-    for form in forms_of(model).values():
+    for form in forms(model).values():
         for variable in form.variables:
             curves_of = [term.function for term in variable.terms]
             steep = max(map(_slope, curves_of), default=0.0)
@@ -298,7 +298,7 @@ def curves(model: Document) -> Criterion:
     """
     trial = Trial("N7", _ADVICE, worst=0.0)
     sides: dict[tuple[str, LR, str], str] = {}
-    for title, form in forms_of(model).items():
+    for title, form in forms(model).items():
         for variable in form.variables if form.rules else ():
             for term in variable.terms:
                 if isinstance(curve := term.function, LR):
