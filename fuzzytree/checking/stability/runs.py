@@ -11,14 +11,23 @@ functions of two libraries can take two runners (`semantics.programs.bounds`).
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, cast
 
 import msgspec
 import numpy as np
 
 from fuzzytree.checking.certificates import exact_errors
-from fuzzytree.checking.comparing import ModelRun, same_bits, unequal
+from fuzzytree.checking.comparing import (
+    Allow,
+    ModelRun,
+    RowSet,
+    by_libraries,
+    compare,
+    differences,
+    row_set,
+    unequal,
+)
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
     BoolArray,
@@ -40,10 +49,9 @@ from fuzzytree.runtimes import (
     needed_by,
     plan_axes,
 )
-from fuzzytree.semantics import error_bounds, forms, program_of
+from fuzzytree.semantics import forms, program_of
 
 _SLOW_ROWS = 60  # rows that a slow runtime is given, whatever the others get
-_EDGE = 1e-6  # share of an output's range; a wider bound says little
 
 Truth = Decisions | Outcome
 """What is right for some rows: exact decisions, or the numbers of a system."""
@@ -78,14 +86,22 @@ class LoadedForm(msgspec.Struct, frozen=True):
 
         Bits must be equal, but for what a library's functions change in a system.
         """
-        wrong = unequal(one, two)
-        if wrong.any() and self.model.outputs:
-            gap, allowed = number_gaps(self.model, values, one, two)
-            wrong = np.asarray((gap > allowed).any(axis=0))
-        if not wrong.any():
-            return int(wrong.size), None
-        count = f"{int(wrong.sum())} of {wrong.size} rows are answered differently"
-        return int(wrong.size), f"{self.title}{what.format(count)}"
+        size, count = values.shape[1], int(unequal(one, two).sum())
+        if count and self.model.outputs:
+            apart = differences(*self.compared(one, two, values))
+            count = apart.wrong.size
+        if not count:
+            return size, None
+        text = f"{count} of {size} rows are answered differently"
+        return size, f"{self.title}{what.format(text)}"
+
+    def compared(
+        self, one: Outcome, two: Outcome, values: FloatArray
+    ) -> tuple[ModelRun, ModelRun, RowSet, Allow]:
+        """Return two outcomes of rows as they are compared: within last bits."""
+        first, second = (ModelRun(self.title, self.model, each) for each in (one, two))
+        rows = row_set(self.model.inputs, values[:, :0], values)
+        return first, second, rows, by_libraries(lambda: program_of(self.model))
 
 
 def loaded_forms(
@@ -199,38 +215,25 @@ def exact_check(
     """
     right = truth(one.model, values) if right is None else right
     outcome = one.run(values)
-    compare = _numbers_off if isinstance(right, Outcome) else _strengths_off
-    low, allowed, is_open, wrong, flips, text = compare(one, values, outcome, right)
-    faults: tuple[str, ...] = ()
-    if wrong.any():
-        row = int(np.flatnonzero(wrong)[np.argmax(low[wrong])])
-        count = f"{int(wrong.sum())} of {wrong.size} rows are beyond the bound"
-        where = row_text(one.model.inputs, values, row)
-        faults = (f"{one.title}: {count}: {text(row)}: {where}",)
-    bounded = np.where(is_open, 0.0, low)
-    worst = int(np.argmax(bounded)) if low.size else 0
-    return ExactCheck(
-        int(wrong.size),
-        float(bounded[worst]) if low.size else 0.0,
-        float(allowed[worst]) if low.size else 0.0,
-        float(low.max(initial=0.0)),
-        int(flips.sum()),
-        int(is_open.sum()),
-        faults,
-        outcome,
-    )
+    if isinstance(right, Outcome):
+        compared = compare(*one.compared(outcome, right, values))
+        count = f"{compared.differing} of {compared.rows} rows are beyond the bound"
+        return ExactCheck(
+            compared.rows,
+            compared.largest_difference,
+            compared.allowed,
+            max(compared.largest_difference, compared.largest_unbounded),
+            compared.flips,
+            compared.unbounded,
+            tuple(f"{one.title}: {count}: {text}" for text in compared.detail[:1]),
+            outcome,
+        )
+    return _strength_check(one, values, outcome, right)
 
 
-Errors = tuple[
-    FloatArray, FloatArray, BoolArray, BoolArray, BoolArray, Callable[[int], str]
-]
-"""Of each row: the error, its bound, whether that proves nothing, whether the row is
-wrong and has another answer; and what is wrong with a row, in words."""
-
-
-def _strengths_off(
-    one: LoadedForm, values: FloatArray, outcome: Outcome, right: Any
-) -> Errors:
+def _strength_check(
+    one: LoadedForm, values: FloatArray, outcome: Outcome, right: Decisions
+) -> ExactCheck:
     """Compare strengths and classes with exact decisions."""
     model: Any = one.model
     known = ~missing_rows(model, values, one.runtime.dtype)
@@ -245,73 +248,28 @@ def _strengths_off(
     flips = errors.flips & known
     low = np.where(known, 0.0 if errors.low is None else errors.low, 0.0)
     wrong = flips & ~errors.close | (low > allowed)
-
-    def text(row: int) -> str:
+    faults: tuple[str, ...] = ()
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[np.argmax(low[wrong])])
+        text = f"rule {outcome.rule[row]} wins and another is right"
         if low[row] > allowed[row]:
-            return f"strengths off by {low[row]:.3g}, {allowed[row]:.3g} allowed"
-        return f"rule {outcome.rule[row]} wins and another is right"
-
-    return low, allowed, known & (allowed >= 1.0), wrong, flips, text
-
-
-def _numbers_off(
-    one: LoadedForm, values: FloatArray, outcome: Outcome, right: Any
-) -> Errors:
-    """Compare all numbers of a system with the right ones."""
-    gap, allowed = number_gaps(one.model, values, outcome, right)
-    spans = np.ones((len(gap), 1))
-    spans[: len(one.model.outputs)] = output_spans(one.model, right)
-    is_open, is_wrong = allowed > _EDGE * spans, gap > allowed
-    low = np.where(is_open & ~is_wrong, 0.0, gap)
-    worst = np.argmax(np.where(is_wrong.any(axis=0) & ~is_wrong, -1.0, low), axis=0)
-    cells = worst, np.arange(gap.shape[1])
-
-    def text(row: int) -> str:
-        line, names = int(worst[row]), [output.name for output in one.model.outputs]
-        rules = [f"rule {k + 1}" for k in range(len(gap) - len(names) - 1)]
-        names = [*(f"output {name!r}" for name in names), *rules, "status"]
-        has_strengths = bool(rules)
-        tables = [_numbers(o, has_strengths=has_strengths) for o in (outcome, right)]
-        number, other = (float(table[line, row]) for table in tables)
-        limit = f"{allowed[line, row]:.3g} allowed"
-        return f"{names[line]} {number!r} where {other!r} is right, {limit}"
-
-    flips = outcome.status != right.status
-    wrong = np.asarray(is_wrong.any(axis=0))
-    is_edge = np.asarray(is_open.any(axis=0))
-    return low[cells], allowed[cells], is_edge, wrong, flips, text
-
-
-def number_gaps(
-    model: Document, values: FloatArray, one: Outcome, two: Outcome
-) -> tuple[FloatArray, FloatArray]:
-    """Return how far the numbers of a system are apart, and how far they may be.
-
-    Returns:
-        Two arrays of shape (numbers, rows): outputs, activations if both have them,
-        and the status. A number is infinitely far from NaN.
-    """
-    has_strengths = one.strengths is not None and two.strengths is not None
-    first, second = (_numbers(some, has_strengths=has_strengths) for some in (one, two))
-    is_same = same_bits(first, second)
-    with np.errstate(invalid="ignore"):
-        gap = np.abs(first - second)
-    gap[np.isnan(gap)] = np.inf
-    gap[is_same] = 0.0
-    rows = np.flatnonzero(~is_same.all(axis=0))
-    allowed = np.zeros(gap.shape)
-    if rows.size:
-        program = program_of(model, with_strengths=has_strengths)
-        allowed[:, rows] = error_bounds(program, values[:, rows])
-    return gap, allowed
-
-
-def _numbers(outcome: Outcome, *, has_strengths: bool) -> FloatArray:
-    """Return all numbers of a system in the order of its program's results."""
-    strengths = outcome.strengths if has_strengths else None
-    status = outcome.status[np.newaxis].astype(np.float64)
-    parts = (outcome.outputs, strengths, status)
-    return np.vstack([part for part in parts if part is not None])
+            text = f"strengths off by {low[row]:.3g}, {allowed[row]:.3g} allowed"
+        count = f"{int(wrong.sum())} of {wrong.size} rows are beyond the bound"
+        where = row_text(model.inputs, values, row)
+        faults = (f"{one.title}: {count}: {text}: {where}",)
+    is_open = known & (allowed >= 1.0)
+    bounded = np.where(is_open, 0.0, low)
+    worst = int(np.argmax(bounded)) if low.size else 0
+    return ExactCheck(
+        int(wrong.size),
+        float(bounded[worst]) if low.size else 0.0,
+        float(allowed[worst]) if low.size else 0.0,
+        float(low.max(initial=0.0)),
+        int(flips.sum()),
+        int(is_open.sum()),
+        faults,
+        outcome,
+    )
 
 
 def output_spans(model: Document, outcome: Outcome) -> FloatArray:
