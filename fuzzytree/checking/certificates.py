@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -11,6 +11,7 @@ from fuzzytree.checking.comparing import ModelRun, RowSet, labels
 from fuzzytree.model import (
     BoolArray,
     Certified,
+    Document,
     Dtype,
     FloatArray,
     FuzzyTree,
@@ -24,6 +25,7 @@ from fuzzytree.numerics import (
     strength_bounds,
     strength_errors,
 )
+from fuzzytree.runtimes import axis_lines, plan_axes
 from fuzzytree.semantics import Status
 
 _SHOWN = 5  # differing rows listed for each number type
@@ -110,6 +112,34 @@ def exact_errors(
     rules = cast("RuleBase", model)
     low = None if strengths is None else strength_errors(rules, values, strengths)[0]
     return ExactErrors(low, flips, truth.margin <= 2.0 * allowed)
+
+
+def missing_rows(
+    model: Document,
+    values: FloatArray,
+    dtype: Dtype,
+    names: Collection[str] | None = None,
+) -> BoolArray:
+    """Return which rows count as missing, by the declared policy.
+
+    A row is missing if the value of a variable, of any or of those with these `names`,
+    is not finite in the type of axes: inputs rounded to it, combinations added up in
+    their order, each step rounded.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1, inputs=1, leaves=2)
+        >>> missing_rows(tree, np.array([[1.0, np.nan, 1e39]]), "float32").tolist()
+        [False, True, True]
+    """
+    plan = plan_axes(
+        model.variables, np.dtype("float32" if dtype == "float32" else "float64")
+    )
+    with np.errstate(all="ignore"):
+        lines = axis_lines(plan, values)
+    if names is not None:
+        lines = lines[np.array([plan.line[name] for name in names], np.intp)]
+    return np.asarray(~np.isfinite(lines).all(axis=0))
 
 
 def _exact_texts(

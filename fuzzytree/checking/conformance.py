@@ -12,6 +12,7 @@ import math
 import random
 import re
 import time
+import traceback
 from collections.abc import Iterable, Iterator
 from typing import get_args
 
@@ -332,12 +333,8 @@ def _told(error: Exception | None) -> str:
     name = type(error).__name__
     if isinstance(error, FuzzyTreeError):
         return f"{name}: {text}"
-    place = ""
-    trace = error.__traceback__ if error is not None else None
-    while trace is not None:
-        code = trace.tb_frame.f_code
-        place = f" in {code.co_name}, line {trace.tb_lineno}"
-        trace = trace.tb_next
+    frames = traceback.extract_tb(error.__traceback__ if error else None)
+    place = "".join(f" in {last.name}, line {last.lineno}" for last in frames[-1:])
     return f"{name}{place}: {text}"
 
 

@@ -16,6 +16,7 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
+from fuzzytree.checking.certificates import missing_rows
 from fuzzytree.checking.comparing import (
     ModelRun,
     RowSet,
@@ -30,7 +31,6 @@ from fuzzytree.model import (
     LR,
     Agreement,
     Band,
-    BoolArray,
     Comparison,
     Document,
     Dtype,
@@ -48,7 +48,7 @@ from fuzzytree.model import (
     fingerprint,
     kind_of,
 )
-from fuzzytree.runtimes import axis_lines, baseline, find_runtime, plan_axes
+from fuzzytree.runtimes import baseline, find_runtime
 from fuzzytree.semantics import (
     Pruned,
     Removed,
@@ -62,7 +62,6 @@ from fuzzytree.semantics import (
 
 if TYPE_CHECKING:
     from fuzzytree.exporters import Output
-    from fuzzytree.runtimes import Real
     from fuzzytree.semantics import Form
 
 
@@ -352,18 +351,6 @@ def prove(
     )
 
 
-def _is_seen(model: Document, left: Document, rows: RowSet, dtype: Dtype) -> BoolArray:
-    """Return the rows in which nothing is missing that only the whole model sees."""
-    is_seen: BoolArray = np.ones(rows.numbers.shape, np.bool_)
-    kind: Real = np.dtype("float32" if dtype == "float32" else "float64")
-    plan = plan_axes(model.variables, kind)
-    with np.errstate(invalid="ignore", over="ignore"):
-        lines = axis_lines(plan, rows.values)
-    for name in unguarded(model, left):
-        is_seen &= np.isfinite(lines[plan.line[name]])
-    return is_seen
-
-
 def _compared(
     title: str,
     runtime: Runtime,
@@ -375,7 +362,8 @@ def _compared(
 ) -> Iterator[Comparison]:
     if kind_of(model) not in runtime.runs:
         return
-    is_seen = _is_seen(whole, remainder.model, rows, runtime.dtype)
+    unseen = unguarded(whole, remainder.model)  # what only the whole model looks at
+    is_seen = ~missing_rows(whole, rows.values, runtime.dtype, unseen)
     order = [model.inputs.index(one) for one in left.inputs]
     outcome = runtime.load(left)(np.ascontiguousarray(rows.values[order]))
     numbered = _in_old_numbers(outcome, model, remainder.rules)

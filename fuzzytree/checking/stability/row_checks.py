@@ -10,6 +10,7 @@ from typing import Any, cast, get_args
 import msgspec
 import numpy as np
 
+from fuzzytree.checking.certificates import missing_rows
 from fuzzytree.checking.comparing import strength_gap
 from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.checking.stability.results import Criterion, Trial
@@ -20,7 +21,6 @@ from fuzzytree.checking.stability.runs import (
     first_line,
     loaded_form,
     loaded_forms,
-    missing_rows,
     other_bits,
     row_text,
     run_with_warning,

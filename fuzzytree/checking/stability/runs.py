@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, cast
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.certificates import exact_errors
+from fuzzytree.checking.certificates import exact_errors, missing_rows
 from fuzzytree.checking.comparing import (
     Allow,
     ModelRun,
@@ -30,7 +30,6 @@ from fuzzytree.checking.comparing import (
 )
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
-    BoolArray,
     Document,
     Dtype,
     FloatArray,
@@ -42,12 +41,10 @@ from fuzzytree.model import (
 )
 from fuzzytree.numerics import Decisions, decide, strength_bounds
 from fuzzytree.runtimes import (
-    axis_lines,
     baseline,
     definition,
     is_installed,
     needed_by,
-    plan_axes,
 )
 from fuzzytree.semantics import forms, program_of
 
@@ -281,21 +278,3 @@ def output_spans(model: Document, outcome: Outcome) -> FloatArray:
         if output.low is not None and output.high is not None:
             spans[line] = output.high - output.low
     return np.asarray(spans)
-
-
-def missing_rows(model: Document, values: FloatArray, dtype: Dtype) -> BoolArray:
-    """Return which rows count as missing, by the declared policy.
-
-    A row is missing if the value of any variable is not finite in the type of axes:
-    inputs rounded to it, combinations added up in their order, each step rounded.
-
-    Example:
-        >>> from fuzzytree.testing import random_tree
-        >>> tree = random_tree(1, inputs=1, leaves=2)
-        >>> missing_rows(tree, np.array([[1.0, np.nan, 1e39]]), "float32").tolist()
-        [False, True, True]
-    """
-    kind = np.dtype(np.float32) if dtype == "float32" else np.dtype(np.float64)
-    with np.errstate(all="ignore"):
-        lines = axis_lines(plan_axes(model.variables, kind), values)
-    return np.asarray(~np.isfinite(lines).all(axis=0))
