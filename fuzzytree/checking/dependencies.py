@@ -24,14 +24,15 @@ from fuzzytree.checking.comparing import (
     counted,
     row_set,
 )
+from fuzzytree.checking.equivalence import with_functions
 from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.exporters import Contents, contents
 from fuzzytree.exporters import write_onnx as write_onnx
 from fuzzytree.model import (
     LR,
     Agreement,
-    Band,
     Comparison,
+    Curve,
     Document,
     Dtype,
     FloatArray,
@@ -39,11 +40,9 @@ from fuzzytree.model import (
     Model,
     ModelKind,
     Outcome,
-    Points,
     Proposition,
     RuleBase,
     Runtime,
-    Shape,
     Use,
     fingerprint,
     kind_of,
@@ -260,29 +259,17 @@ def _with_rules(
     return replace(rules, rules=tuple(changed))
 
 
-def _without_curves(rules: RuleBase) -> RuleBase:
-    """Return a rule base whose sides have one number."""
-    variables = tuple(
-        replace(
-            v, terms=tuple(replace(t, function=_straight(t.shape)) for t in v.terms)
-        )
-        for v in rules.variables
-    )
-    return replace(rules, variables=variables)
-
-
-def _straight(shape: Shape) -> Shape:
-    match shape:
-        case LR(left=below, right=above):
-            sides = [replace(side, curve=side.curve[:1]) for side in (below, above)]
-            return replace(shape, left=sides[0], right=sides[1])
-        case Band() | Points():
-            return shape
+def _straight(curve: Curve) -> Curve:
+    """Return a membership function whose sides have one number."""
+    if not isinstance(curve, LR):
+        return curve
+    sides = [replace(side, curve=side.curve[:1]) for side in (curve.left, curve.right)]
+    return replace(curve, left=sides[0], right=sides[1])
 
 
 COMBINATIONS = "combinations"
 
-_FEATURES: Mapping[str, Callable[[RuleBase], RuleBase]] = MappingProxyType(
+_FEATURES: Mapping[str, Callable[[RuleBase], Document]] = MappingProxyType(
     {
         "negation": lambda rules: _with_rules(
             rules, lambda proposition: replace(proposition, hedges=())
@@ -296,7 +283,7 @@ _FEATURES: Mapping[str, Callable[[RuleBase], RuleBase]] = MappingProxyType(
         "an answer of its own for missing values": lambda rules: replace(
             rules, semantics=replace(rules.semantics, missing=rules.semantics.uncovered)
         ),
-        "curves": _without_curves,
+        "curves": lambda rules: with_functions(rules, _straight),
     }
 )
 """What rules may have, and the rules without it: the same if they have none."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Literal, cast, get_args
 
 from msgspec.structs import replace
@@ -54,16 +54,19 @@ def is_equivalent(model: Document, other: Document) -> bool:
     return any(_mark(one) == mark for one in _stand_ins(model))
 
 
-def with_points_once(model: Document) -> Document:
-    """Return a model in which a point that stands twice stands once, as FLL has it."""
+def with_functions(model: Document, change: Callable[[Curve], Curve]) -> Document:
+    """Return a model whose inputs have other membership functions."""
 
-    def term(term: Term) -> Term:
-        if isinstance(term.function, Points):
-            return replace(term, function=points_once(term.function))
-        return term
+    def term(old: Term) -> Term:
+        return replace(old, function=change(old.function))
 
     variables = (replace(v, terms=tuple(map(term, v.terms))) for v in model.variables)
     return replace(model, variables=tuple(variables))
+
+
+def as_points_once(curve: Curve) -> Curve:
+    """Return points in which one that stands twice stands once, as FLL has them."""
+    return points_once(curve) if isinstance(curve, Points) else curve
 
 
 def _mark(model: Document) -> str:

@@ -27,7 +27,7 @@ from fuzzytree.checking.comparing import (
     labels,
     within,
 )
-from fuzzytree.checking.equivalence import is_equivalent, with_points_once
+from fuzzytree.checking.equivalence import as_points_once, is_equivalent, with_functions
 from fuzzytree.checking.subject import Subject, fixed_errors, rounding
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format, fixed_point, stated_options
@@ -274,7 +274,8 @@ def _content(
     What `fuzzytree needs` writes is made once more, then compared with the model by
     proof; what is left of a tree need not serve all that the tree does.
     """
-    fault = first_difference(with_points_once(expected), with_points_once(other))
+    both = (with_functions(model, as_points_once) for model in (expected, other))
+    fault = first_difference(*both)
     if fault and expected.outputs and is_equivalent(expected, other):
         return counted("file", title, "the system but for names", 1, ())
     for uses in _SERVED if fault else ():

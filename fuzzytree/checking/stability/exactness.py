@@ -9,11 +9,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, assert_never, get_args
+from typing import Any, get_args
 
 import msgspec
 import numpy as np
 
+from fuzzytree.checking.equivalence import with_functions
 from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import (
     ExactCheck,
@@ -39,12 +40,10 @@ from fuzzytree.model import (
     Document,
     Dtype,
     FloatArray,
-    Points,
     Proposition,
     Rule,
     RuleBase,
     Runtime,
-    Shape,
     Side,
     SystemRule,
     Term,
@@ -196,12 +195,8 @@ class TermProbes(msgspec.Struct, frozen=True):
     left_out: int  # how many terms are not tested, for there are too many
 
 
-def term_probes(
-    form: Document, change: Callable[[Shape], Shape] | None = None
-) -> TermProbes | None:
+def term_probes(form: Document) -> TermProbes | None:
     """Return the terms of a model as rules, and their edges as rows.
-
-    `change` gives what is tested in place of each membership function.
 
     Returns:
         The rows and rules; None if no rule tests a term. A tree has no rules. The
@@ -221,8 +216,6 @@ def term_probes(
         for term in source.terms:
             if next(numbers) % step:
                 continue
-            if change is not None and isinstance(term.function, Band | LR | Points):
-                term = msgspec.structs.replace(term, function=change(term.function))
             terms.append(term)
             marks = landmarks_of(term.function)
             line += (near for x in marks for near in neighbours(x))
@@ -252,11 +245,12 @@ def term_probes(
     return TermProbes(model, values, tuple(places), left_out)
 
 
-def collapsed(shape: Shape) -> Shape:
-    """Return the narrowest shape at the same place: what one sample would leave.
+def collapsed(curve: Curve) -> Curve:
+    """Return the narrowest function at the same place: what one sample would leave.
 
-    Plateaus that are closed on both sides hold one double, flanks end at the next
-    double, spreads are one unit in the last place of the mean.
+    Curves of other engines stay. Plateaus that are closed on both sides hold one
+    double, flanks end at the next double, spreads are one unit in the last place of
+    the mean.
     """
 
     def narrow(end: float | None, edge: float | None) -> float | None:
@@ -268,16 +262,15 @@ def collapsed(shape: Shape) -> Shape:
         spread = max(math.ulp(mean), 2.0**-1000)
         return msgspec.structs.replace(side, spread=spread)
 
-    match shape:
+    match curve:
         case Band(low=low, high=high, left=left, right=right):
             if low is not None and high is not None:
                 high = math.nextafter(low, math.inf)
             return Band(low, high, narrow(left, low), narrow(right, high))
         case LR(mean=mean, left=below, right=above):
             return LR(mean, thin(below, mean), thin(above, mean))
-        case Points():
-            return shape
-    assert_never(shape)
+        case _:
+            return curve
 
 
 def _try_terms(
@@ -285,7 +278,7 @@ def _try_terms(
     model: Document,
     runtimes: Sequence[Runtime],
     title: str,
-    change: Callable[[Shape], Shape] | None = None,
+    change: Callable[[Curve], Curve] = lambda curve: curve,
 ) -> None:
     """Compare the degrees of all terms in all runtimes with what must be.
 
@@ -293,7 +286,7 @@ def _try_terms(
     tested in place of each membership function.
     """
     for representation, form in forms(model).items():
-        terms = term_probes(form, change)
+        terms = term_probes(with_functions(form, change)) if form.rules else None
         if terms is None:
             continue
         if terms.left_out:
