@@ -150,7 +150,9 @@ class FixedSteps(CSteps):
         """Yield examples in whole numbers, as they stand in the file."""
         units = self.output_units[:, 0]
         errors = (np.ceil(self.whole_worst.errors[:-1] * units) + 1.0).tolist()
-        wholes = self.whole_inputs(np.array(rows).reshape(len(rows), -1).T).T
+        wholes = self.whole_inputs(
+            np.array(rows).reshape(len(rows), len(self.ranges)).T
+        ).T
         for line in wholes:
             inputs = (line / self.input_units[:, 0]).tolist()
             values = dict(zip(self.program.inputs, inputs, strict=True))

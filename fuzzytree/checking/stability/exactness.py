@@ -26,7 +26,6 @@ from fuzzytree.checking.stability.runs import (
     loaded_form,
     loaded_forms,
     other_bits,
-    run_with_warning,
     truth,
 )
 from fuzzytree.checking.stability.sensitivity import input_scales
@@ -301,7 +300,7 @@ def _try_terms(
                 trial.skipped.append(f"{runtime.name} promises a bound, and no edge")
                 continue
             values = one.some(terms.values)
-            outcome, warning = run_with_warning(one, values)
+            outcome, warning = one.run_with_warning(values)
             trial.add(0, warning and f"{one.title}: it warns: {warning}")
             if outcome.strengths is None:
                 trial.skipped.append(f"{runtime.name} returns no degrees")

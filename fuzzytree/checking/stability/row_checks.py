@@ -23,7 +23,6 @@ from fuzzytree.checking.stability.runs import (
     loaded_forms,
     other_bits,
     row_text,
-    run_with_warning,
 )
 from fuzzytree.checking.stability.sensitivity import input_scales
 from fuzzytree.checking.stability.transforms import NORMAL, exponent_range, scaled
@@ -244,7 +243,7 @@ def specials(
     first: FirstOutcomes = {}
     for one in loaded_forms(model, runtimes, trial.skipped):
         tried = one.some(rows)
-        outcome, warning = run_with_warning(one, tried)
+        outcome, warning = one.run_with_warning(tried)
         trial.add(tried.shape[1], warning and f"{one.title}: it warns: {warning}")
         trial.faults += _broken_policy(one, tried, outcome)
         is_zero = tried == 0.0

@@ -20,7 +20,9 @@ import numpy as np
 from fuzzytree.checking.certificates import exact_errors, missing_rows
 from fuzzytree.checking.comparing import (
     Allow,
+    Allowance,
     ModelRun,
+    Results,
     RowSet,
     by_libraries,
     compare,
@@ -48,6 +50,7 @@ from fuzzytree.runtimes import (
 )
 from fuzzytree.semantics import forms, program_of
 
+_EDGE = 1e-6  # share of an output's range; a wider bound says little
 _SLOW_ROWS = 60  # rows that a slow runtime is given, whatever the others get
 
 Truth = Decisions | Outcome
@@ -69,8 +72,15 @@ class LoadedForm(msgspec.Struct, frozen=True):
     loud: Run  # its answers, with the warnings that it lets out
 
     def run(self, values: FloatArray) -> Outcome:
-        """Answer rows, and keep warnings in; check N4 examines them."""
-        return run_with_warning(self, values)[0]
+        """Answer rows, and keep warnings in."""
+        return self.run_with_warning(values)[0]
+
+    def run_with_warning(self, values: FloatArray) -> tuple[Outcome, str | None]:
+        """Answer rows, and return the first warning that was let out, if any."""
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            outcome = self.loud(values)
+        return outcome, str(caught[0].message) if caught else None
 
     def some(self, values: FloatArray) -> FloatArray:
         """Return the rows to run: a share of them if the runtime is slow."""
@@ -95,10 +105,25 @@ class LoadedForm(msgspec.Struct, frozen=True):
     def compared(
         self, one: Outcome, two: Outcome, values: FloatArray
     ) -> tuple[ModelRun, ModelRun, RowSet, Allow]:
-        """Return two outcomes of rows as they are compared: within last bits."""
+        """Return two outcomes of rows as they are compared: within last bits.
+
+        A bound that is wide beside an output's range is counted apart.
+        """
         first, second = (ModelRun(self.title, self.model, each) for each in (one, two))
         rows = row_set(self.model.inputs, values[:, :0], values)
-        return first, second, rows, by_libraries(lambda: program_of(self.model))
+        names = [output.name for output in self.model.outputs]
+        spans = dict(zip(names, output_spans(self.model, two)[:, 0], strict=True))
+
+        def allow(results: Results, values: FloatArray) -> Allowance:
+            bounds = by_libraries(lambda: program_of(self.model))(results, values)
+            widths = [
+                [spans[name] if kind == "output" else 1.0]
+                for kind, name in results.keys
+            ]
+            is_loose = bounds.amounts > _EDGE * np.array(widths)
+            return bounds._replace(is_loose=is_loose)
+
+        return first, second, rows, allow
 
 
 def loaded_forms(
@@ -131,14 +156,6 @@ def loaded_form(
         skipped.append(f"{title}: {first_line(error)}")
         return None
     return LoadedForm(title, representation, runtime, form, run)
-
-
-def run_with_warning(one: LoadedForm, values: FloatArray) -> tuple[Outcome, str | None]:
-    """Return a runtime's answers, and the first warning that it let out, if any."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        outcome = one.loud(values)
-    return outcome, str(caught[0].message) if caught else None
 
 
 FirstOutcomes = dict[tuple[str, Dtype, bool], tuple[str, Outcome]]
