@@ -236,7 +236,7 @@ def exact_check(
             compared.rows,
             compared.largest_difference,
             compared.allowed,
-            max(compared.largest_difference, compared.largest_unbounded),
+            compared.largest_difference,
             compared.flips,
             compared.unbounded,
             tuple(f"{one.title}: {count}: {text}" for text in compared.detail[:1]),
