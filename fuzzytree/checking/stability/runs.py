@@ -212,11 +212,9 @@ def truth(model: Document, values: FloatArray) -> Truth:
         return decide(cast("Model", model), values)
     right, some = baseline().load(model)(values), share(values)
     inferred = definition().load(model)(values[:, some])
-    arrays = msgspec.structs.asdict(right)
     for name in ("status", "strengths", "outputs"):
-        arrays[name] = np.array(arrays[name])
-        arrays[name][..., some] = getattr(inferred, name)
-    return Outcome(**arrays)
+        getattr(right, name)[..., some] = getattr(inferred, name)
+    return right
 
 
 def exact_check(
