@@ -519,7 +519,7 @@ def _run(
     rows, model, allow = subject.rows, text.form, None
     total, stated = len(rows.numbers), text.options.get("dtype")
     dtype: Dtype = "float32" if stated == "float32" else "float64"
-    if stated == "q15" or stated == "q31":
+    if stated in ("q15", "q31"):
         fixed = fixed_point(model, text.options)
         rows = rows.part(np.flatnonzero(~np.isnan(rows.values).any(axis=0)))
         values = fixed.whole_inputs(rows.values) / fixed.input_units
