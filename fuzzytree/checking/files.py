@@ -337,7 +337,8 @@ def _check_onnx(subject: Subject, title: str, file: OnnxModel) -> Iterator[Findi
         return
     from fuzzytree.exporters import differences
 
-    form = counterpart(subject, content.form, file.semantics.conjunction)
+    stated = "tree" if file.representation == "tree" else content.form
+    form = counterpart(subject, stated, file.semantics.conjunction)
     faults: Sequence[str] = (no_counterpart(subject),)
     if form is not None:
         apart = differences(file.content, form)
