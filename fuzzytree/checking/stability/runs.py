@@ -230,6 +230,7 @@ def exact_check(
     if isinstance(right, Outcome):
         compared = compare(*one.compared(outcome, right, values))
         count = f"{compared.differing} of {compared.rows} rows are beyond the bound"
+        texts = [text.partition(": ")[2] for text in compared.detail[:1]]  # no number
         return ExactCheck(
             compared.rows,
             compared.largest_difference,
@@ -237,7 +238,7 @@ def exact_check(
             compared.largest_difference,
             compared.flips,
             compared.unbounded,
-            tuple(f"{one.title}: {count}: {text}" for text in compared.detail[:1]),
+            tuple(f"{one.title}: {count}: {text}" for text in texts),
             outcome,
         )
     return _strength_check(one, values, outcome, right)

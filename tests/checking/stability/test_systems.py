@@ -62,7 +62,7 @@ def test_a_system_passes_every_check_in_every_runtime(name: str) -> None:
 @pytest.mark.parametrize(
     ("defect", "text"),
     [
-        (defects.SINGLE, "rows are beyond the bound: row "),
+        (defects.SINGLE, "rows are beyond the bound: heat "),
         (defects.OTHER_ORDER, "output 'fan' "),
         (defects.NO_DEFAULT, "output 'fan' nan where 7.5 is right"),
     ],
