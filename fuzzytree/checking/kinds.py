@@ -116,8 +116,10 @@ _FORMS: dict[ModelKind, tuple[ModelKind, ...]] = {
 
 def _nearest(representation: ModelKind, form: Format) -> ModelKind:
     """Return the nearest kind of model that a format carries, or else the same."""
-    nearest = (one for one in _FORMS[representation] if one in form.carries)
-    return next(nearest, representation)
+    for nearest in _FORMS[representation]:
+        if nearest in form.carries:
+            return nearest
+    return representation
 
 
 def _refuse_remaking(
