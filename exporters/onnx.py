@@ -18,11 +18,11 @@ import msgspec
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.exporters.program_text import rated_rules
 from fuzzytree.model import (
+    Document,
     Dtype,
     Format,
     FuzzySystem,
     FuzzyTree,
-    Model,
     RuleBase,
     Written,
     fingerprint,
@@ -87,7 +87,7 @@ _OF_SYSTEMS: tuple[Output, ...] = ("outputs", "status", "activations")
 
 
 def write_onnx(
-    model: Model | FuzzySystem,
+    model: Document,
     /,
     *,
     allow_loss: bool = False,
@@ -188,7 +188,7 @@ def write_onnx(
 
 
 def _check_options(
-    model: Model | FuzzySystem,
+    model: Document,
     dtype: Dtype,
     opset: int,
     ir: int,
@@ -212,7 +212,7 @@ def _check_options(
 
 
 def check_outputs(
-    model: Model | FuzzySystem, outputs: Sequence[str], known: Sequence[str]
+    model: Document, outputs: Sequence[str], known: Sequence[str]
 ) -> None:
     """Refuse outputs that a graph does not have, or that are named twice."""
     for name in outputs:
@@ -243,7 +243,7 @@ def require(package: str, purpose: str) -> None:
 
 
 def _columns(
-    model: Model | FuzzySystem, signature: Signature, columns: Sequence[str]
+    model: Document, signature: Signature, columns: Sequence[str]
 ) -> tuple[str, ...]:
     """Return the columns of the input; none if rows of any width are taken."""
     if columns:
@@ -257,7 +257,7 @@ def _columns(
 
 
 def _model_proto(
-    model: Model | FuzzySystem,
+    model: Document,
     dtype: Dtype,
     opset: int,
     ir: int,
@@ -327,7 +327,7 @@ def _model_proto(
 
 
 def _facts(
-    model: Model | FuzzySystem,
+    model: Document,
     dtype: Dtype,
     columns: Sequence[str],
     outputs: Sequence[Output],
@@ -354,7 +354,7 @@ def _facts(
 
 
 def facts_of(
-    model: Model | FuzzySystem,
+    model: Document,
     holds: str,
     records: Mapping[str, object],
     /,
@@ -372,7 +372,7 @@ def facts_of(
     }
 
 
-def _in_words(model: Model | FuzzySystem, dtype: Dtype) -> tuple[str, str]:
+def _in_words(model: Document, dtype: Dtype) -> tuple[str, str]:
     """Return the kind of a graph, and what it computes, for people."""
     answer = _answer(model.semantics.missing)
     match model:

@@ -17,7 +17,7 @@ import msgspec
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.exporters.onnx_graph import TREES
-from fuzzytree.model import FuzzySystem, Model, Written, fingerprint
+from fuzzytree.model import Document, Written, fingerprint
 
 if TYPE_CHECKING:
     import onnx
@@ -48,7 +48,7 @@ class Differences(NamedTuple):
 
 def differences(
     content: bytes,
-    model: Model | FuzzySystem,
+    model: Document,
     write: Callable[..., Written] | None = None,
     **options: Any,
 ) -> Differences:
