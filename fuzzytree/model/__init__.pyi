@@ -171,6 +171,7 @@ from .tree import interval_names as interval_names
 from .tree import intervals as intervals
 from .tree import node_mistakes as node_mistakes
 from .tree import outline as outline
+from .tree import root_of as root_of
 from .tree import with_label_type as with_label_type
 from .values import Value as Value
 from .variables import DATE_UNIT as DATE_UNIT

@@ -140,34 +140,27 @@ def depth(tree: Document) -> int:
     return max(depths, default=0)
 
 
+def root_of(tree: Document) -> Branch:
+    """Return the way to the first node of a tree, or to its only leaf."""
+    return Branch((), node=1) if tree.nodes else Branch((), leaf=1)
+
+
 def outline(tree: FuzzyTree) -> Iterator[str]:
     """Yield the tree line by line, two spaces a level, branches in interval order."""
-    todo: list[tuple[int, Branch]] = []
-    yield from _expand(tree, 0, 1 if tree.nodes else None, 1, todo)
+    todo = [(0, root_of(tree))]
     while todo:
         depth, branch = todo.pop()
-        yield from _expand(tree, depth, branch.node, branch.leaf, todo, branch)
-
-
-def _expand(
-    tree: FuzzyTree,
-    depth: int,
-    node: int | None,
-    leaf: int | None,
-    todo: list[tuple[int, Branch]],
-    branch: Branch | None = None,
-) -> Iterator[str]:
-    label = " or ".join(branch.terms) + ": " if branch else ""
-    indent = "  " * depth
-    if node is None:
-        end = tree.leaves[(leaf or 1) - 1]
-        pattern = f" ({end.pattern})" if end.pattern not in ("", end.label) else ""
-        yield f"{indent}{label}{end.label}{pattern} [{leaf}]"
-        return
-    current = tree.nodes[node - 1]
-    cuts = ", ".join(f"{cut:.6g}" for cut in current.cuts)
-    yield f"{indent}{label}{current.variable}? (cut at {cuts})"
-    todo.extend((depth + 1, branch) for branch in reversed(current.branches))
+        label = " or ".join(branch.terms) + ": " if branch.terms else ""
+        start = "  " * depth + label
+        if branch.node is None:
+            end = tree.leaves[(branch.leaf or 1) - 1]
+            pattern = f" ({end.pattern})" if end.pattern not in ("", end.label) else ""
+            yield f"{start}{end.label}{pattern} [{branch.leaf}]"
+            continue
+        node = tree.nodes[branch.node - 1]
+        cuts = ", ".join(f"{cut:.6g}" for cut in node.cuts)
+        yield f"{start}{node.variable}? (cut at {cuts})"
+        todo.extend((depth + 1, way) for way in reversed(node.branches))
 
 
 def interval_names(nodes_cuts: Sequence[Sequence[float]]) -> list[list[str]]:
@@ -298,18 +291,14 @@ def _cut_mistakes(path: Path, where: str, node: Node) -> Iterator[Mistake]:
 def _order_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
     """Walk depth-first and expect nodes and leaves in the order of their numbers."""
     nodes = leaves = 0
-    todo: list[Branch] = [
-        Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
-    ]
+    todo = [root_of(tree)]
     while todo:
         branch = todo.pop()
         if branch.leaf is not None:
             leaves += 1
             if branch.leaf != leaves:
-                yield (
-                    ("nodes",),
-                    f"leaf {branch.leaf} stands where leaf {leaves} should",
-                )
+                text = f"leaf {branch.leaf} stands where leaf {leaves} should"
+                yield ("nodes",), text
                 return
         elif branch.node is not None:
             nodes += 1

@@ -31,6 +31,7 @@ from fuzzytree.model import (
     Use,
     Variable,
     kind_of,
+    root_of,
 )
 
 Form = Literal["tree", "relative rules", "raw rules", "rules", "system"]
@@ -153,8 +154,7 @@ def _variables(tree: Document, kind: Kind) -> tuple[Variable, ...]:
 
 def _rules(tree: Document, kind: Kind) -> tuple[Rule, ...]:
     rules: list[Rule] = []
-    start = Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
-    todo: list[tuple[Branch, tuple[Proposition, ...]]] = [(start, ())]
+    todo: list[tuple[Branch, tuple[Proposition, ...]]] = [(root_of(tree), ())]
     while todo:
         branch, path = todo.pop()
         if branch.leaf is not None:

@@ -23,7 +23,7 @@ from fuzzytree.auditing.decide.domain import (
     variable_value,
 )
 from fuzzytree.auditing.decide.linear import Row, feasible, row_of
-from fuzzytree.model import Branch, Document, Value, Variable, intervals
+from fuzzytree.model import Branch, Document, Value, Variable, intervals, root_of
 from fuzzytree.numerics import outwards
 
 Interval = tuple[float | None, float | None]
@@ -47,8 +47,7 @@ class Region(Value, frozen=True):
 
 def regions(tree: Document) -> tuple[Region, ...]:
     """Return the region of each leaf, in the order of the leaves."""
-    start = Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
-    todo: list[tuple[Branch, dict[str, Union]]] = [(start, {})]
+    todo: list[tuple[Branch, dict[str, Union]]] = [(root_of(tree), {})]
     result: list[Region] = []
     while todo:
         branch, sides = todo.pop()
