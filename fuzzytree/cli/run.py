@@ -10,7 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias, cast
 
 import click
 import msgspec
@@ -33,7 +33,6 @@ from fuzzytree.cli.console import (
 from fuzzytree.errors import TableError
 from fuzzytree.files import open_atomically
 from fuzzytree.model import (
-    FuzzySystem,
     checkpoint,
     printable_json,
 )
@@ -42,7 +41,7 @@ from fuzzytree.semantics import rules_of
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from fuzzytree.model import Document
+    from fuzzytree.model import Document, RuleBase
     from fuzzytree.runtimes import By, OnnxModel, Outputs, Predictions
     from fuzzytree.tables import Batch
 
@@ -255,7 +254,7 @@ def _reasons(
     path: str, model: Document | OnnxModel
 ) -> Callable[[Batch, Predictions | Outputs], list[str]]:
     from fuzzytree.report import system_reasons
-    from fuzzytree.runtimes import OnnxModel, Outputs, Predictions, reasons
+    from fuzzytree.runtimes import OnnxModel, Outputs, reasons
 
     if isinstance(model, OnnxModel):
         raise click.UsageError(
@@ -264,11 +263,9 @@ def _reasons(
     rules = rules_of(model)
 
     def reason(batch: Batch, found: Predictions | Outputs) -> list[str]:
-        if isinstance(rules, FuzzySystem):
-            assert isinstance(found, Outputs)  # a system answers nothing else
+        if isinstance(found, Outputs):
             return system_reasons(rules, found)
-        assert isinstance(found, Predictions)
-        return reasons(rules, batch.values, found)
+        return reasons(cast("RuleBase", rules), batch.values, found)  # of classes
 
     return reason
 

@@ -15,7 +15,6 @@ from fuzzytree.model import (
     Curve,
     Document,
     Formula,
-    FuzzySystem,
     Leaf,
     Linear,
     Node,
@@ -302,9 +301,10 @@ def _summands(parts: Sequence[Part]) -> Iterator[str]:
         yield f"{'-' if part.weight < 0 else '+'} {number(abs(part.weight))} * {inner}"
 
 
-def system_reasons(system: FuzzySystem, outputs: Outputs) -> list[str]:
+def system_reasons(system: Document, outputs: Outputs) -> list[str]:
     """Return, for each row, the rules that were activated, each with its degree."""
-    texts = [rule_text(rule) for rule in system.rules]
+    rules: Rules = system.rules
+    texts = [*map(rule_text, rules)]
     if outputs.strengths is None:
         return [""] * len(outputs)
     rows = zip(outputs.strengths.T.tolist(), outputs.status.tolist(), strict=True)
