@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 KINDS = {"FuzzyTree", "RuleBase", "FuzzySystem"}
 WORDS = {"tree", "rules", "system"}
 KIND_NAMES = {"representation", "kind_of"}
-MOST = 46
+MOST = 36
 
 
 def names(node: ast.AST) -> set[str]:
