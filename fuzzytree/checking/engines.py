@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 from typing import cast
 
 import numpy as np
@@ -11,10 +12,11 @@ from msgspec.structs import replace
 from fuzzytree.errors import ReadError
 from fuzzytree.model import FloatArray, FuzzySystem, Loss, Reading, SystemOutput
 from fuzzytree.runtimes import run_system
-from fuzzytree.semantics import Aim, infer, range_rows, system_probes
+from fuzzytree.semantics import Aim, infer, landmarks_of, range_rows, system_probes
 
 _ROWS = 200  # of each kind: on landmarks, drawn evenly, and aimed at rules
-_FEW = 4  # which are tried before all
+_FEW = 4  # which are tried before all where rules are many
+_MANY_RULES = 100
 _AGREEMENT = 1e-9  # of the largest number; engines of one meaning are nearer in tests
 
 
@@ -38,17 +40,24 @@ def with_answers(reading: Reading, read: Callable[..., Reading]) -> Reading:
             rival = read(dialect=dialect)
         except ReadError:
             continue  # that engine refuses the file
-        other = cast("FuzzySystem", rival.model)  # of the same file
+        model = cast("FuzzySystem", rival.model)  # of the same file
+        other = _with_default(model, system)
         if other == system:
             continue
-        alike = replace(other, outputs=_alike(other.outputs, system.outputs))
+        sampled = [
+            replace(theirs, defuzzifier=ours.defuzzifier)
+            for theirs, ours in zip(other.outputs, system.outputs, strict=True)
+        ]
+        alike = replace(other, outputs=tuple(sampled))
         meant = None if alike == system else _place(system, alike, values)
-        place = meant or _place(system, other, values)
+        place = meant
+        if not meant and alike != other:
+            place = _place(system, other, values)
         if place is None:
             continue
-        output, row = place
-        point = dict(zip(system.inputs, values[:, row].tolist(), strict=True))
-        ours, theirs = (infer(one, point).outputs[output] for one in (system, other))
+        output, row, ours = place
+        point = _point(system, values, row)
+        theirs = infer(other, point).outputs[output]
         sentence = (
             f"{system.outputs[output].name} is {ours:.9g} in "
             f"{reading.dialect} and {theirs:.9g} in {rival.dialect} at "
@@ -62,56 +71,77 @@ def with_answers(reading: Reading, read: Callable[..., Reading]) -> Reading:
     return replace(reading, losses=tuple(losses), remarks=tuple(remarks))
 
 
-def _alike(
-    theirs: Sequence[SystemOutput], ours: Sequence[SystemOutput]
-) -> tuple[SystemOutput, ...]:
-    """Return outputs with our samples, and our default where either has none.
+def _with_default(other: FuzzySystem, system: FuzzySystem) -> FuzzySystem:
+    """Return a system with the defaults of another where only one of them has one.
 
-    A default that only one of two has changes no number that both have.
+    Such a default changes no number that both have.
     """
-    return tuple(
-        replace(
-            their,
-            defuzzifier=our.defuzzifier,
-            default=our.default
-            if None in (our.default, their.default)
-            else their.default,
-        )
-        for their, our in zip(theirs, ours, strict=True)
+    outputs = tuple(
+        replace(theirs, default=ours.default)
+        if None in (theirs.default, ours.default)
+        else theirs
+        for theirs, ours in zip(other.outputs, system.outputs, strict=True)
     )
+    return other if outputs == other.outputs else replace(other, outputs=outputs)
+
+
+def _point(system: FuzzySystem, values: FloatArray, row: int) -> dict[str, float]:
+    return dict(zip(system.inputs, values[:, row].tolist(), strict=True))
 
 
 def _place(
     system: FuzzySystem, other: FuzzySystem, values: FloatArray
-) -> tuple[int, int] | None:
-    """Return an output and a row in which two systems differ, if they do.
+) -> tuple[int, int, float] | None:
+    """Return an output and a row in which two systems differ, and the first's number.
 
-    A few rows often suffice, and cost less than the programs that run all of them.
+    All rows show where they differ most. Where rules are many, a few rows often
+    suffice, and cost less than the programs that run all of them.
     """
-    rows = values.shape[1]
+    rows = values.shape[1] if len(system.rules) > _MANY_RULES else 0
+    noise = np.array([_noise(output) for output in system.outputs])
     for row in range(0, rows, max(rows // _FEW, 1)):
-        point = dict(zip(system.inputs, values[:, row].tolist(), strict=True))
+        point = _point(system, values, row)
         ours, theirs = (
-            np.array([infer(one, point).outputs]).T for one in (system, other)
+            np.array([infer(model, point).outputs]).T for model in (system, other)
         )
-        apart = _distances(ours, theirs)
+        apart = _distances(ours, theirs, noise)
         if apart.max() > _AGREEMENT:
-            return int(apart.argmax()), row
-    apart = _distances(_outputs(system, values), _outputs(other, values))
+            output = int(apart.argmax())
+            return output, row, float(ours[output, 0])
+    ours = _outputs(system, values)
+    noise[np.isinf(noise)] = 0.0
+    apart = _distances(ours, _outputs(other, values), noise)
     if not apart.size or apart.max() <= _AGREEMENT:
         return None
     index = np.unravel_index(apart.argmax(), apart.shape)
-    return int(index[0]), int(index[1])
+    return int(index[0]), int(index[1]), float(ours[index])
 
 
-def _distances(ours: FloatArray, theirs: FloatArray) -> FloatArray:
+def _noise(output: SystemOutput) -> float:
+    """Return below which size an output is 0 but for rounding; inf if unknown.
+
+    Sums of thousands of numbers round by less than 1e-12 of the largest; with
+    `_AGREEMENT`, that is a thousandth of the numbers that make up the output's terms.
+    """
+    ends = [end for end in (output.low, output.high) if end is not None]
+    points = [x for term in output.terms for x in landmarks_of(term.function)]
+    return max((abs(x) / 1000 for x in ends + points), default=math.inf)
+
+
+def _distances(ours: FloatArray, theirs: FloatArray, noise: FloatArray) -> FloatArray:
     """Return how far numbers are apart, as parts of the largest of each output.
 
     Rows for which one of them has no number count as equal: it is no answer.
+
+    Args:
+        ours: Shape (outputs, rows).
+        theirs: Of the same shape.
+        noise: Sizes for the outputs whose numbers are all smaller.
     """
     with np.errstate(invalid="ignore"):  # of infinite numbers
         apart = np.nan_to_num(np.abs(ours - theirs), posinf=0.0)
     sizes = np.nan_to_num(np.abs(ours), posinf=0.0).max(axis=1, initial=0.0)
+    sizes = np.maximum(sizes, noise)
     result: FloatArray = apart / np.where(sizes > 0.0, sizes, 1.0).reshape(-1, 1)
     return result
 

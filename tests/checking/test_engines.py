@@ -215,6 +215,25 @@ def test_engines_that_agree_are_no_loss() -> None:
     assert not any("engines" in one for one in found.remarks)
 
 
+def test_a_difference_of_many_rules_that_shows_at_once_builds_no_program(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rule = "  RULE 4 : IF c IS p THEN y IS hi;\n"
+    text = of_fcl("", "a IS p", CURVES).replace("END_RULEB", 200 * rule + "END_RULEB")
+    monkeypatch.delattr("fuzzytree.checking.engines.run_system")
+    assert "engines" in [one.where for one in reading(text, "fcl").losses]
+
+
+def test_numbers_that_only_rounding_sets_apart_from_zero_are_no_loss() -> None:
+    """Engines that sum samples in another order agree about 0 up to rounding."""
+    text = MAMDANI.replace("[0 30]", "[-0.3 0.3]")
+    for curve in ("[-9 0 15]", "[10 25 30]"):
+        text = text.replace(curve, "[-0.3 0 0.3]")
+    found = reading(text, "fis")
+    assert found.losses == ()
+    assert not any("engines" in one for one in found.remarks)
+
+
 CONTRADICTIONS = [
     (
         of_fcl("ACCU : MAX;", "a IS p", NUMBERS),
