@@ -17,9 +17,10 @@ import os
 import random
 import re
 import shlex
+import struct
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,6 +29,7 @@ from fuzzytree.cli.program import main
 from tests.interop.matrix_models import KINDS, write_model
 
 ROWS = 60
+SLOW = 20.0  # seconds of CPU time for a verb that does not measure time
 TARGETS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "yaml": (".yaml", ()),
     "fcl": (".fcl", ()),
@@ -78,6 +80,7 @@ LETTERS = {
     "l": "it works with losses that are listed and allowed",
     "n": "it is written, and nothing here runs it",
     "r": "it is refused",
+    "s": "it works, and takes more than 20 seconds of CPU time",
     "W": "wrong: answers differ, or a printed next step fails",
     "X": "a crash",
 }
@@ -102,8 +105,18 @@ REASONS: tuple[tuple[str, str], ...] = (
         "centroid or an average; the sentence names what is in the way",
     ),
     (
-        "the dialect [a-z]+ has no .* (there|alike)|[a-z]+ has no such conclusion",
+        "the dialect [a-z]+ has no .* (there|alike)|[a-z]+ has no such conclusion"
+        "|matlab has no way to say '",
         "this dialect has no words for it; the sentence names one that has",
+    ),
+    (
+        "as smt-lib: rule [0-9]+: not a minimum, product or maximum",
+        "SMT-LIB is written of minima, products and maxima, which are what is proved",
+    ),
+    (
+        "is a fuzzy system whose outputs are numbers, and is not compared with rules",
+        "jFuzzyLogic joins OR by the algebraic sum where AND is the product, so its "
+        "scores are no rules with maximum; that loss is listed",
     ),
     (
         "must reference an input, but there is none",
@@ -143,12 +156,14 @@ def cell_of(words: Iterable[str], finding: str = "W") -> tuple[Cell, str]:
     """Run a command, and return its cell and what it prints; 1 is a `finding`."""
     words = [*words]
     command = shlex.join(["fuzzytree", *words])
+    start = _cpu_s()
     try:
         code, out, err = call(*words)
     except Exception as error:  # whatever it is, it is a crash
         return Cell("X", f"{type(error).__name__}: {error}", command), ""
     lines = [line for line in err.splitlines() if not line.startswith("remark ")]
     sentence = " ".join(lines[:2])[:240]
+    took = _cpu_s() - start
     letter = {0: ".", 1: finding, 2: "r"}.get(code, "X")
     if letter == "r" and "Traceback" in err:
         letter = "X"
@@ -157,7 +172,14 @@ def cell_of(words: Iterable[str], finding: str = "W") -> tuple[Cell, str]:
             step = shlex.split(line)
             if step[0] != "check" and call(*step)[0]:
                 return Cell("W", f"the next step fails: {line}", command), out
+    if letter == "." and took > SLOW and words[0] != "bench":
+        return Cell("s", f"{took:.0f} s of CPU time", command), out
     return Cell(letter, "" if letter == "." else sentence, command), out
+
+
+def _cpu_s() -> float:
+    """Return the CPU time of this process and of those that it waited for."""
+    return sum(os.times()[:4])
 
 
 def cells_of(kind: str) -> Cells:
@@ -180,10 +202,11 @@ def _cells(kind: str) -> Iterator[tuple[str, Cell]]:
         csv.writer(file).writerows([names, *(row or ["1"] for row in _rows(inputs))])
     for name, verb in VERBS.items():
         yield name, cell_of(model if word == "M" else word for word in verb.split())[0]
-    truth = _answers(model)
-    width = (
-        None if facts.get("outputs") else 1
-    )  # all numbers and the status, or classes
+    truth = _answers(model, "rows.csv")
+    _round_rows()
+    rounded = _answers(model, "rounded.csv")
+    # All numbers and the status, or classes.
+    width = None if facts.get("outputs") else 1
     for name, (suffix, options) in TARGETS.items():
         file_name = "out" + suffix
         words = ["convert", model, file_name, *options]
@@ -195,7 +218,8 @@ def _cells(kind: str) -> Iterator[tuple[str, Cell]]:
         if cell.letter in ".l":
             yield f"{name}: check", _check(model, file_name, allow=cell.letter == "l")
             if cell.letter == "." and file_name.endswith(READABLE):
-                yield f"{name}: run", _compared(file_name, truth, width)
+                truths = [truth, rounded] if "float32" in name else [truth]
+                yield f"{name}: run", _compared(file_name, truths, width)
 
 
 def _check(model: str, name: str, *, allow: bool) -> Cell:
@@ -208,21 +232,39 @@ def _check(model: str, name: str, *, allow: bool) -> Cell:
     return cell
 
 
-def _answers(model: str) -> list[list[str]]:
-    return list(csv.reader(call("run", model, "rows.csv")[1].splitlines()))[1:]
+def _answers(model: str, table: str) -> list[list[str]]:
+    return list(csv.reader(call("run", model, table)[1].splitlines()))[1:]
 
 
-def _compared(name: str, truth: list[list[str]], width: int | None) -> Cell:
-    """Compare the first so many cells of a file's answers with those of the model."""
-    answers = _answers(name)
-    pairs = [*zip(answers, truth, strict=False)]
+def _round_rows() -> None:
+    """Write the rows again, their numbers rounded to float32."""
+    with Path("rows.csv").open(newline="", encoding="utf-8") as file:
+        rows = [[_single(word) for word in row] for row in csv.reader(file)]
+    with Path("rounded.csv").open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows(rows)
+
+
+def _single(word: str) -> str:
+    try:
+        [number] = struct.unpack("f", struct.pack("f", float(word)))
+    except ValueError:
+        return word
+    return repr(number)
+
+
+def _compared(name: str, truths: Sequence[list[list[str]]], width: int | None) -> Cell:
+    """Compare the first so many cells of a file's answers with those of the model.
+
+    A row is right if it is that of any of the tables.
+    """
+    answers = _answers(name, "rows.csv")
     wrong = [
         row
-        for row, other in pairs
-        if not all(map(_is_same, row[:width], other[:width]))
+        for row, *others in zip(answers, *truths, strict=False)
+        if not any(all(map(_is_same, row[:width], one[:width])) for one in others)
     ]
-    if wrong or len(answers) != len(truth):
-        text = f"{len(wrong)} of {len(truth)} rows differ"
+    if wrong or len(answers) != len(truths[0]):
+        text = f"{len(wrong)} of {len(truths[0])} rows differ"
         return Cell("W", text, f"fuzzytree run {name} rows.csv")
     return Cell(".")
 
@@ -294,12 +336,12 @@ def reason_of(cell: Cell) -> str | None:
 
 
 def faults(table: Mapping[str, Cells]) -> list[str]:
-    """Return the cells that must not be: wrong ones, and refusals without a reason."""
+    """Return the cells that must not be: wrong, slow, refused without a reason."""
     return [
         f"{cell.letter} {kind}, {name}: {cell.sentence}\n    {cell.command}"
         for kind, cells in table.items()
         for name, cell in cells.items()
-        if cell.letter in "WX" or (cell.letter == "r" and reason_of(cell) is None)
+        if cell.letter in "WXs" or (cell.letter == "r" and reason_of(cell) is None)
     ]
 
 
@@ -350,6 +392,19 @@ def letters_of(text: str, kind: str) -> dict[str, str]:
     rows = [line.strip("|\n").split("|") for line in text.splitlines() if "|" in line]
     cells = {row[0].strip(): row[place].strip() for row in rows[2:]}
     return {name: letter for name, letter in cells.items() if letter}
+
+
+def reasons_of(text: str, kind: str) -> dict[str, str]:
+    """Return the reasons of refusals that a page has for a kind of model, by cell."""
+    letter = chr(ord("a") + [*KINDS].index(kind))
+    reasons: dict[str, str] = {}
+    for line in text.splitlines():
+        for why in (why for _, why in REASONS if line.startswith(f"- {why}: ")):
+            for place in line.removeprefix(f"- {why}: ").rstrip(".").split("; "):
+                name, _, marks = place.rstrip(")").rpartition(" (")
+                if letter in marks.split(", "):
+                    reasons[name] = why
+    return reasons
 
 
 def command() -> int:

@@ -6,6 +6,7 @@ import contextlib
 import csv
 import datetime
 import io
+import itertools
 import random
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -146,6 +147,57 @@ RULE 2 : IF a IS high AND b IS NOT low THEN z IS large WITH 0.5;
 END_RULEBLOCK
 END_FUNCTION_BLOCK
 """
+FLL = """Engine: f
+InputVariable: a
+  range: 0.0 10.0
+  term: low Ramp 6.0 2.0
+  term: high Sigmoid 6.0 2.0
+InputVariable: b
+  range: 0.0 10.0
+  lock-range: true
+  term: low Triangle 0.0 0.0 6.0
+  term: high Bell 8.0 2.0 3.0
+OutputVariable: z
+  range: 0.0 30.0
+  aggregation: AlgebraicSum
+  defuzzifier: Centroid 100
+  default: nan
+  term: small Triangle 0.0 5.0 15.0
+  term: large Gaussian 25.0 4.0
+RuleBlock: one
+  conjunction: AlgebraicProduct
+  disjunction: AlgebraicSum
+  implication: AlgebraicProduct
+  activation: General
+  rule: if a is low or b is very low then z is small
+  rule: if a is high and b is not low then z is large with 0.5
+"""
+FML_INPUT = """<fuzzyVariable name="{name}" type="input"
+ domainleft="0" domainright="10">
+<fuzzyTerm name="low"><leftLinearShape param1="2" param2="6"/></fuzzyTerm>
+<fuzzyTerm name="high"><gaussianShape param1="8" param2="2"/></fuzzyTerm>
+</fuzzyVariable>"""
+FML_RULE = """<rule name="{term}" connector="{word}" weight="1.0"><antecedent>
+<clause><variable>a</variable><term>{term}</term></clause>
+<clause><variable>b</variable><term>{term}</term></clause></antecedent>
+<consequent><then><clause><variable>z</variable><term>{then}</term></clause></then>
+</consequent></rule>"""
+FML = f"""<?xml version="1.0" encoding="UTF-8"?>
+<fuzzySystem xmlns="http://www.ieee1855.org" name="f"><knowledgeBase>
+{FML_INPUT.format(name="a")}
+{FML_INPUT.format(name="b")}
+<fuzzyVariable name="z" domainleft="0" domainright="30" type="output"
+ accumulation="MAX" defuzzifier="COG" defaultValue="12">
+<fuzzyTerm name="small">
+<triangularShape param1="0" param2="5" param3="15"/></fuzzyTerm>
+<fuzzyTerm name="large">
+<triangularShape param1="10" param2="25" param3="30"/></fuzzyTerm>
+</fuzzyVariable></knowledgeBase>
+<mamdaniRuleBase name="r" activationMethod="MIN" andMethod="MIN" orMethod="MAX">
+{FML_RULE.format(term="low", word="or", then="small")}
+{FML_RULE.format(term="high", word="and", then="large")}
+</mamdaniRuleBase></fuzzySystem>
+"""
 
 
 class Model(NamedTuple):
@@ -213,6 +265,44 @@ def _tested(pick: random.Random) -> Iterable[Row]:
         yield round(a, 3), round(b, 3), "uvw"[(int(a) + 2 * int(b)) % 3]
 
 
+def _tactile() -> str:
+    """Write frames of two shapes, their features, and a tree of these."""
+    pick = random.Random(2)
+    places = list(itertools.product(range(8), range(8)))
+    for name, tall in (("bar", 2), ("dot", 1)):
+        lines = [["time", "number", *(f"r{r}c{c}" for r, c in places)]]
+        for number in range(40):
+            top, left = pick.randrange(5), pick.randrange(6)
+            force = pick.randrange(60, 200)
+            cells = [
+                force + pick.randrange(20)
+                if 0 <= r - top <= tall and 0 <= c - left < 2
+                else 0
+                for r, c in places
+            ]
+            lines.append([str(cell) for cell in (number / 10, number, *cells)])
+        text = "".join(f"{','.join(line)}\n" for line in lines)
+        Path(f"{name}.csv").write_text(text, encoding="utf-8")
+    words = ["tactile", "features", "bar=bar.csv", "dot=dot.csv", "-o", "data.csv"]
+    if main(words):
+        raise RuntimeError("no features could be made")
+    if main(["learn", "data.csv", "--target", "class", "-o", "model.yaml"]):
+        raise RuntimeError("a tree could not be learned")
+    return "model.yaml"
+
+
+def _sklearn() -> str:
+    """Write a tree of scikit-learn."""
+    from sklearn.tree import DecisionTreeClassifier
+
+    pick = random.Random(3)
+    points = [[pick.random() * 10, pick.random() * 5] for _ in range(200)]
+    classes = [int(a > 5) + int(b > 2.5 and a > 2) for a, b in points]
+    tree = DecisionTreeClassifier(max_depth=3, random_state=0).fit(points, classes)
+    ft.save(ft.from_sklearn(tree, classes=["p", "q", "r"]), "model.yaml")
+    return "model.yaml"
+
+
 def _text(name: str, content: str) -> Callable[[], str]:
     def write() -> str:
         Path(name).write_text(content, encoding="utf-8")
@@ -273,6 +363,8 @@ KINDS: Final = {
         "a tree of 30 leaves",
         _learned("p,q,class", _tested, "--leaves", "30", "--min-rows", "5", *ONE),
     ),
+    "tree tactile": Model("a tree of tactile features", _tactile),
+    "tree sklearn": Model("a tree of scikit-learn", _sklearn),
     "rules relative": Model(
         "the relative rules of a tree",
         _learned("p,q r,s,class", _blobs, "--no-test", rules=("--as", "rules")),
@@ -282,6 +374,19 @@ KINDS: Final = {
         _learned(
             "p,q r,s,class", _blobs, *ONE, rules=("--as", "rules", "--terms", "raw")
         ),
+    ),
+    "rules product": Model(
+        "the raw rules of a tree under the product",
+        _learned(
+            "p,q r,s,class",
+            _blobs,
+            "--no-test",
+            rules=("--as", "rules", "--terms", "raw", "--conjunction", "product"),
+        ),
+    ),
+    "rules mixed": Model(
+        "the relative rules of a tree with categories",
+        _learned("colour,size,class", _mixed, "--no-test", rules=("--as", "rules")),
     ),
     "rules hand": Model("rules by hand", _text("model.yaml", RULES)),
     "rules categories": Model(
@@ -309,6 +414,8 @@ KINDS: Final = {
     ),
     "fis": Model("a FIS file", _text("model.fis", FIS)),
     "fcl": Model("an FCL file", _text("model.fcl", FCL)),
+    "fll": Model("an FLL file", _text("model.fll", FLL)),
+    "fml": Model("an FML file", _text("model.fml", FML)),
 }
 """The models by name."""
 

@@ -26,14 +26,28 @@ def test_the_page_says_what_works_on_a_kind_of_model(
         library(package)
     cells = matrix.cells_of(kind)
     assert matrix.faults({kind: cells}) == []
+    page = PAGE.read_text("utf-8")
     letters = {name: cell.letter for name, cell in cells.items()}
-    assert letters == matrix.letters_of(PAGE.read_text("utf-8"), kind)
+    assert letters == matrix.letters_of(page, kind)
+    reasons = {
+        name: matrix.reason_of(cell)
+        for name, cell in cells.items()
+        if cell.letter == "r"
+    }
+    assert reasons == matrix.reasons_of(page, kind)
 
 
 def test_a_refusal_without_a_reason_is_a_fault() -> None:
     cells = {"run": matrix.Cell("r", "no such thing", "fuzzytree run m.yaml")}
     assert matrix.faults({"mamdani": cells}) == [
         "r mamdani, run: no such thing\n    fuzzytree run m.yaml"
+    ]
+
+
+def test_a_verb_that_takes_long_is_a_fault() -> None:
+    cells = {"needs": matrix.Cell("s", "21 s of CPU time", "fuzzytree needs m.yaml")}
+    assert matrix.faults({"mamdani": cells}) == [
+        "s mamdani, needs: 21 s of CPU time\n    fuzzytree needs m.yaml"
     ]
 
 
