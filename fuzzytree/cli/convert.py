@@ -194,7 +194,10 @@ def carry(
     after = next_check((source, read_as), (chosen.output, form.name), more=more)
     if after and found.losses:
         after += " --allow-loss"
-    if model.outputs and not found.model.outputs:
+    is_system = bool(model.outputs)
+    if written.losses and form.read and not is_system:  # rules may be lost as well
+        is_system = bool(form.read(written.content, chosen.output).model.outputs)
+    if is_system and not found.model.outputs:
         after = ""  # numbers are not compared with classes
     label, shows = "next", ""
     if written.losses:

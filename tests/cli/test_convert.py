@@ -23,6 +23,7 @@ from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
 from tests.formats.test_fcl import EITHER
+from tests.interop.matrix_models import RULES
 
 HELP = "\n  fuzzytree convert --help lists the options\n"
 SYSTEMS = [form.name for form in all_formats() if "system" in form.carries]
@@ -591,6 +592,20 @@ def test_an_option_that_does_nothing_is_refused(
 
 
 @pytest.mark.heavy
+@pytest.mark.parametrize(("norm", "has_next"), [("minimum", True), ("product", False)])
+def test_rules_that_become_scores_name_no_check_that_cannot_be(
+    call: Call, norm: str, has_next: bool
+) -> None:
+    """jFuzzyLogic has no maximum beside the product: scores are not read as rules."""
+    Path("hand.yaml").write_text(RULES.replace("{and: minimum", f"{{and: {norm}"))
+    words = ("convert", "hand.yaml", "hand.fcl", "--dialect", "jfuzzylogic")
+    code, out, err = call(*words, "--allow-loss")
+    assert code == 0
+    assert ("next     fuzzytree check" in out + err) == has_next
+    code, _, err = call("check", "hand.yaml", "hand.fcl")
+    assert (code == 2) == ("outputs are numbers" in err) == (not has_next)
+
+
 def test_points_in_pmml_are_refused_like_other_losses(call: Call) -> None:
     ft.save(ft.rules_from_tree(random_tree(2), "raw"), "r.yaml")
     words = ("convert", "r.yaml", "a.pmml", "--set", "curves=points")
