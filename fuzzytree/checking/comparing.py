@@ -24,7 +24,6 @@ from fuzzytree.model import (
     IntArray,
     Model,
     Outcome,
-    RuleBase,
     Unchecked,
     Verdict,
     kind_of,
@@ -55,7 +54,7 @@ OTHER_FUNCTION = (
 def file_content(title: str, model: Document, dtype: object = "float64") -> FileContent:
     """Return what a file holds, as people call it."""
     form: str = kind_of(model)
-    if isinstance(model, RuleBase) and model.kind:
+    if model.kind:
         form = f"{model.kind} {form}"
     return FileContent(title, form, str(dtype))
 
