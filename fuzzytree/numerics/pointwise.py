@@ -7,11 +7,10 @@ end; the bound covers that rounding, at every real value.
 
 from __future__ import annotations
 
-import bisect
 import itertools
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -90,8 +89,11 @@ def product(one: Lines, other: Lines, tolerance: float) -> tuple[Lines, float]:
             worst = max(worst, abs(rise) / (4 * count * count))
             _refuse_many(len(knots) + count)
             for step in range(1, count):
-                x = before[0] + (here[0] - before[0]) * Fraction(step, count)
-                y = _degree(one, x) * _degree(other, x)
+                share = Fraction(step, count)
+                x = before[0] + (here[0] - before[0]) * share
+                y = Fraction(1)
+                for low, high in zip(before[1:], here[1:], strict=True):
+                    y *= low.above + (high.at - low.above) * share
                 knots.append(_Knot(x, y, y))
         x, first, second = here
         knots.append(_Knot(x, first.at * second.at, first.above * second.above))
@@ -131,7 +133,7 @@ def rounded_lines(lines: Lines) -> tuple[Points, float]:
     return points, _distance(lines, lines_of(points))
 
 
-def _needed(lines: Lines) -> Iterator[_Knot]:
+def _needed(lines: Sequence[_Knot]) -> Iterator[_Knot]:
     """Yield the knots at which something changes, none too far from the next."""
     kept = lines[0].x
     for place, knot in enumerate(lines):
@@ -151,42 +153,53 @@ def _joined(
     knots: list[_Knot] = []
     for before, here in itertools.pairwise([None, *_common(one, other)]):
         assert here is not None  # only the first is
-        if before is not None:
+        if before is not None and _is_crossing(before[1], before[2], here[1], here[2]):
             start = before[1].above - before[2].above
-            end = here[1].at - here[2].at
-            if start * end < 0:
-                x = before[0] + (here[0] - before[0]) * start / (start - end)
-                y = _degree(one, x)
-                knots.append(_Knot(x, y, y))
+            share = start / (start - here[1].at + here[2].at)
+            x = before[0] + (here[0] - before[0]) * share
+            y = before[1].above + (here[1].at - before[1].above) * share
+            knots.append(_Knot(x, y, y))
         x, first, second = here
         knots.append(
             _Knot(x, choose(first.at, second.at), choose(first.above, second.above))
         )
-    return tuple(knots)
+    return tuple(_needed(knots))
+
+
+def _is_crossing(one: _Knot, other: _Knot, end: _Knot, other_end: _Knot) -> bool:
+    if one.above < other.above:
+        return end.at > other_end.at
+    return end.at < other_end.at and one.above != other.above
 
 
 def _common(one: Lines, other: Lines) -> list[tuple[Fraction, _Knot, _Knot]]:
     """Return the values of all knots, and what each of the two has there."""
-    values = sorted({knot.x for knot in (*one, *other)})
-    return [(x, _knot(one, x), _knot(other, x)) for x in values]
+    result: list[tuple[Fraction, _Knot, _Knot]] = []
+    i = j = 0
+    while i < len(one) or j < len(other):
+        first = one[i] if i < len(one) else None
+        second = other[j] if j < len(other) else None
+        if second is None or (first is not None and first.x < second.x):
+            assert first is not None  # one of the two is left
+            i, second = i + 1, _inner(other, j, first.x)
+        elif first is None or second.x < first.x:
+            j, first = j + 1, _inner(one, i, second.x)
+        else:
+            i, j = i + 1, j + 1
+        result.append((first.x, first, second))
+    return result
 
 
-def _knot(lines: Lines, x: Fraction) -> _Knot:
-    place = bisect.bisect_left(lines, x, key=lambda knot: knot.x)
-    if place < len(lines) and lines[place].x == x:
-        return lines[place]
+def _inner(lines: Lines, place: int, x: Fraction) -> _Knot:
+    """Return what lines have at a value between two knots, or beyond all of them."""
+    low, high = lines[max(place - 1, 0)], lines[min(place, len(lines) - 1)]
     if place == 0:
-        y = lines[0].at
-    elif place == len(lines):
-        y = lines[-1].above
+        y = high.at
+    elif place == len(lines) or low.above == high.at:
+        y = low.above
     else:
-        low, high = lines[place - 1], lines[place]
         y = low.above + (high.at - low.above) * (x - low.x) / (high.x - low.x)
     return _Knot(x, y, y)
-
-
-def _degree(lines: Lines, x: Fraction) -> Fraction:
-    return _knot(lines, x).at
 
 
 def _distance(one: Lines, other: Lines) -> float:
