@@ -136,15 +136,33 @@ def rounded_lines(lines: Lines) -> tuple[Points, float]:
 def _needed(lines: Sequence[_Knot]) -> Iterator[_Knot]:
     """Yield the knots at which something changes, none too far from the next."""
     kept = lines[0].x
+    floats = [(float(knot.x), float(knot.at), float(knot.above)) for knot in lines]
     for place, knot in enumerate(lines):
         if 0 < place < len(lines) - 1 and knot.at == knot.above:
+            is_bent = _is_surely_bent(*floats[place - 1 : place + 2])
             before, after = lines[place - 1], lines[place + 1]
-            left = (knot.at - before.above) * (after.x - knot.x)
-            is_straight = left == (after.at - knot.above) * (knot.x - before.x)
-            if is_straight and after.x - kept <= _FARTHEST:
-                continue
+            if not is_bent and after.x - kept <= _FARTHEST:
+                left = (knot.at - before.above) * (after.x - knot.x)
+                if left == (after.at - knot.above) * (knot.x - before.x):
+                    continue
         kept = knot.x
         yield knot
+
+
+_Floats = tuple[float, float, float]
+
+
+def _is_surely_bent(before: _Floats, knot: _Floats, after: _Floats) -> bool:
+    """Return whether doubles tell that a knot does not lie on the line of two others.
+
+    Numbers are off by half a unit in the last place each, and so are results: 16 units
+    of the sizes that enter are more than all of it.
+    """
+    left, right = knot[0] - before[0], after[0] - knot[0]
+    rise = (knot[1] - before[2]) * right - (after[1] - knot[2]) * left
+    degrees = abs(knot[1]) + abs(before[2]) + abs(after[1])
+    values = abs(knot[0]) + abs(before[0]) + abs(after[0])
+    return abs(rise) > 2.0**-48 * (degrees * (left + right) + 2.0 * degrees * values)
 
 
 def _joined(

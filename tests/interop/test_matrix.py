@@ -44,13 +44,6 @@ def test_a_refusal_without_a_reason_is_a_fault() -> None:
     ]
 
 
-def test_a_verb_that_takes_long_is_a_fault() -> None:
-    cells = {"needs": matrix.Cell("s", "21 s of CPU time", "fuzzytree needs m.yaml")}
-    assert matrix.faults({"mamdani": cells}) == [
-        "s mamdani, needs: 21 s of CPU time\n    fuzzytree needs m.yaml"
-    ]
-
-
 def test_every_reason_is_one_that_the_page_needs() -> None:
     page = PAGE.read_text("utf-8")
     assert [why for _, why in matrix.REASONS if f"- {why}: " not in page] == []
