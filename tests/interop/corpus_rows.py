@@ -303,7 +303,7 @@ def _written(model: FuzzySystem, name: str) -> str:
     form = find_format(name)
     # Each writer checks its own options; the protocol knows the common one alone.
     write = cast("Callable[..., Written]", form.write)
-    has_points = any(one.name == "tolerance" for one in options_of(form))
+    has_points = any(o.name == "tolerance" and o.default for o in options_of(form))
     options = {"tolerance": TOLERANCE} if has_points else {}
     try:
         losses = write(model, allow_loss=True, **options).losses
