@@ -928,10 +928,12 @@ def recheck(
 
     names = [os.fspath(path) for path in (audit, model, new) if path is not None]
     try:
-        report = None if new else _recheck_conversion(names[0], names[1], solver)
-        return report or recheck_files(*names, solver=solver)
+        return recheck_files(*names, solver=solver)
     except CannotRunError as error:
-        raise ReadError(str(error)) from error
+        report = None if new else _recheck_conversion(names[0], names[1], solver)
+        if report is None:
+            raise ReadError(str(error)) from error
+        return report
 
 
 def _recheck_conversion(audit: str, path: str, solver: str) -> Report | None:
@@ -943,10 +945,13 @@ def _recheck_conversion(audit: str, path: str, solver: str) -> Report | None:
         if checking.format_of(path).name == "yaml" and read_yaml(source, path):
             return None
     content, model = read_bounded(audit), read(path).model
-    if read_json(content, audit).get("fingerprint") != fingerprint(model):
-        raise ReadError(f"{path}: not the audited model, or read by another --from")
-    made = find_format("yaml").write(model).content
-    return recheck(content, made, (audit, path), solver, source)
+    try:
+        if read_json(content, audit).get("fingerprint") != fingerprint(model):
+            raise ReadError(f"{path}: not the audited model, or read by another --from")
+        text = find_format("yaml").write(model).content
+        return recheck(content, text, (audit, path), solver, source)
+    except CannotRunError as error:
+        raise ReadError(str(error)) from error
 
 
 def draw(tree: ModelSource, *, title: str | None = None) -> Picture:

@@ -67,12 +67,14 @@ class Proof(msgspec.Struct, frozen=True):
         sentence: The same for people.
         certificate: What a number type can change, if the file computes.
         coverage: Of a fuzzy system: which rules probes fire, and what is uncovered.
+        kind: Which kind of model the file is read back as, if it is.
     """
 
     verdict: Literal["equal", "alike", "certified", "as listed", "unproved"]
     sentence: str
     certificate: Certificate | None = None
     coverage: Coverage | None = None
+    kind: ModelKind | None = None
 
 
 class Conversion(msgspec.Struct, frozen=True):
@@ -372,13 +374,15 @@ def _proved(model: Document, form: Format, written: Written, *, dtype: object) -
             what = CALLED[kind_of(model)]
             text = f"read back from the file, the {what} is equal in every number"
             exact = Certificate(None, kind_of(model), 0.0, text)
-            return Proof("equal", text, None if model.outputs else exact)
+            bound = None if model.outputs else exact
+            return Proof("equal", text, bound, kind=kind_of(model))
         case "alike":
             text = "read back from the file, it is equal but for names and notes"
-            return Proof("alike", text)
+            return Proof("alike", text, kind=kind_of(again.model))
         case "other" if written.losses or again.losses:
             text = "read back from the file, it differs by what was lost"
-            return Proof("as listed", f"{text}{_decided(model, again.model)}")
+            text += _decided(model, again.model)
+            return Proof("as listed", text, kind=kind_of(again.model))
         case _:
             raise DisagreementError(
                 f"{model.name} as {form.name} is read back as another model; "

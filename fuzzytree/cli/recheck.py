@@ -27,9 +27,9 @@ def command(options: RecheckOptions) -> int:
     With NEW, AUDIT is the JSON of `fuzzytree diff MODEL NEW`, of two YAML files.
 
     Everything is read and evaluated again by code that imports nothing else of
-    fuzzytree and runs alone, as `python -m fuzzytree.rechecking`; what is PROVED, a
-    solver is asked. Of other files than YAML, fuzzytree makes YAML, which is checked.
-    Exit 1 if something does not hold, 2 if no solver is at hand.
+    fuzzytree and runs alone, as `python -m fuzzytree.rechecking`; a solver decides
+    again what is PROVED. Of other files than YAML, fuzzytree makes YAML, which is
+    checked. Exit 1 if something does not hold, 2 if no solver is at hand.
     """
     from fuzzytree import api
 
