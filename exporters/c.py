@@ -9,6 +9,7 @@ With a macro it is a program that tests itself.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Literal, cast
 
 from fuzzytree.exporters.c_fixed import Q15, Q31, FixedSteps
@@ -185,12 +186,27 @@ def fixed_point(system: Document, options: Mapping[str, Option]) -> FixedSteps:
     Raises:
         ValueError: As `write_c`.
     """
-    file, _ = _system_file(
+    return _fixed_steps(
         cast("FuzzySystem", system),
         str(options["dtype"]),
         activations=bool(options.get("activations")),
         tables=bool(options.get("tables")),
         tolerance=cast("float | None", options.get("tolerance")),
+    )
+
+
+@lru_cache(maxsize=4)
+def _fixed_steps(
+    system: FuzzySystem,
+    dtype: str,
+    *,
+    activations: bool,
+    tables: bool,
+    tolerance: float | None,
+) -> FixedSteps:
+    """Keep what takes seconds, for what runs a file and what compares it."""
+    file, _ = _system_file(
+        system, dtype, activations=activations, tables=tables, tolerance=tolerance
     )
     return cast("FixedSteps", file.steps)  # of a type of whole numbers
 

@@ -113,7 +113,10 @@ class FixedSteps(CSteps):
         program = _in_tables(program)
         self.fixed, self.ranges = numbers, ranges
         self.bits, self.whole_worst = _fitted(program, ranges, numbers)
-        self.worst = worst_over(program, ranges, _rounding(program, self.bits, off))
+        self.worst = self.whole_worst
+        if off:
+            rounding = _rounding(program, self.bits, off)
+            self.worst = worst_over(program, ranges, rounding)
         for result, share in zip(program.results, self.worst.shares, strict=True):
             if share > 0.0:
                 raise ValueError(
@@ -132,7 +135,7 @@ class FixedSteps(CSteps):
         low end of its range.
         """
         ends = np.array(self.ranges).reshape(-1, 2)
-        low, high = np.trunc(ends * self.input_units)[:, :, np.newaxis].swapaxes(0, 1)
+        low, high = np.trunc(ends * self.input_units).T[..., np.newaxis]
         with np.errstate(over="ignore"):
             whole: FloatArray = np.clip(np.rint(values * self.input_units), low, high)
         return np.where(np.isnan(whole), low, whole) + 0.0  # sums have no -0
@@ -296,6 +299,11 @@ def _shifted(text: str, bits: int) -> str:
     return f"((name_wide)({text}) * ((name_wide)1 << {bits}))"
 
 
+def _exact(_: int, __: FloatArray) -> FloatArray:
+    """Round nothing."""
+    return np.zeros(1)
+
+
 def _decided(
     program: Program, ranges: Sequence[tuple[float, float]]
 ) -> tuple[Program, list[int]]:
@@ -303,8 +311,7 @@ def _decided(
 
     And of each step before, which one has its result now.
     """
-    exact: Rounding = lambda _, __: np.zeros(1)  # noqa: E731
-    sizes = worst_over(program, ranges, exact).sizes
+    sizes = worst_over(program, ranges, _exact).sizes
     new: list[int] = []
     steps: list[Step] = []
     for place, step in enumerate(program.steps):
@@ -332,14 +339,14 @@ def _in_tables(program: Program) -> Program:
         count = 1 if step.operation == "divide" else len(step.arguments)
         divisors.difference_update(step.arguments[:count])
     divisors.difference_update(result.step for result in program.results)
+    indexes = {s.samples: p for p, s in enumerate(steps) if s.operation == "index"}
     foreign, turned = set[int](), set[int]()
     for place, step in enumerate(steps):
         table, values = _combined(steps, step), still[place]
         if foreign & {*step.arguments} or step.operation not in _OPERATIONS | _TRUTHS:
             foreign.add(place)
             if isinstance(values, list) and step.kind == "number":
-                sizes = [(one.operation, one.samples) for one in steps]
-                table = sizes.index(("index", step.samples)), np.array(values)
+                table = indexes[step.samples], np.array(values)
         if isinstance(values, float):
             steps[place] = Step("constant", number=values)
         elif step.operation == "divide" and step.arguments[1] in turned:
@@ -380,8 +387,7 @@ def _fitted(
                 f"fixed point has no {operation.replace('_', ' ')}, which "
                 f"{program.titles[place]!r} needs; {hint}"
             )
-    exact: Rounding = lambda _, __: np.zeros(1)  # noqa: E731
-    worst = worst_over(program, ranges, exact)
+    worst = worst_over(program, ranges, _exact)
     for _ in range(_TRIES):
         bits = _bits(program, worst.sizes, numbers, needed)
         before, worst = worst, worst_over(program, ranges, _rounding(program, bits, {}))

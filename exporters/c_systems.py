@@ -32,6 +32,7 @@ from fuzzytree.semantics import (
     from_system,
     probes,
     spreads,
+    term_title,
     worst_over,
 )
 
@@ -295,7 +296,7 @@ def system_file(
             f"{variable.name} is {term.name}": curves[where]
             for variable in system.variables
             for term in variable.terms
-            if (where := f"term {term.name!r} of {variable.name!r}") in curves
+            if (where := term_title(variable, term)) in curves
         }
         fixed = FixedSteps(program, ranges, numbers, off, tables=tables)
         return SystemFile(system, fixed.program, fixed, numbers, fixed.worst)

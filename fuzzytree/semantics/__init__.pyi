@@ -17,6 +17,7 @@ from .conversion.points import pointed as pointed
 from .conversion.points import points_for as points_for
 from .conversion.points import shape_of as shape_of
 from .conversion.points import stepped as stepped
+from .conversion.points import term_title as term_title
 from .conversion.rule_forms import joined_by_number as joined_by_number
 from .conversion.rule_forms import joined_outputs as joined_outputs
 from .conversion.rule_forms import number_losses as number_losses

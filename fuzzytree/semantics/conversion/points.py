@@ -54,6 +54,16 @@ def _is_kept(variable: Variable | SystemOutput, term: Term) -> bool:
     return has_numbers(variable) or isinstance(term.function, Points)
 
 
+def term_title(variable: Variable | SystemOutput, term: Term) -> str:
+    """Return what a loss calls a term.
+
+    Example:
+        >>> term_title(Variable("heat", ()), Term("low", Singleton(1.0)))
+        "term 'low' of 'heat'"
+    """
+    return f"term {term.name!r} of {variable.name!r}"
+
+
 def pointed(
     document: D, tolerance: float, *, keeps: Keeps = _is_kept
 ) -> tuple[D, tuple[Loss, ...]]:
@@ -124,7 +134,7 @@ class _Change:
     def _term(self, variable: Variable | SystemOutput, label: Term) -> Term:
         if self.keeps(variable, label):
             return label
-        where = f"term {label.name!r} of {variable.name!r}"
+        where = term_title(variable, label)
         try:
             result = points_for(label.function, self.tolerance)
         except LossError as error:
