@@ -652,15 +652,21 @@ def inner_values(count: int, *, high: float = 10.0) -> FloatArray:
     return values
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning:skfuzzy")
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_an_engine_answers_a_system_or_shows_its_own_numbers(name: str) -> None:
-    system = ft.read(EXAMPLES / "tipper.fll").model
+def both_outputs(name: str, file: Path) -> tuple[FloatArray, FloatArray]:
+    """Return the outputs of an engine, and the right ones, of 20 rows."""
+    system = ft.read(file).model
     values = inner_values(20)
     outputs = candidate(system, f"{name}: system").load(1).answer(values).outputs
     right = find_runtime("reference").load(system)(values).outputs
     assert outputs is not None
     assert right is not None
+    return outputs, right
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:skfuzzy")
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_an_engine_answers_a_system_or_shows_its_own_numbers(name: str) -> None:
+    outputs, right = both_outputs(name, EXAMPLES / "tipper.fll")
     assert np.isnan(outputs[:, 1]).all()
     if name in NEAR:
         np.testing.assert_allclose(outputs, right, atol=30.0 * NEAR[name])
@@ -675,12 +681,7 @@ def test_an_engine_samples_the_curves_of_a_controller(
 ) -> None:
     file = tmp_path / "fan.fll"
     file.write_text(MAMDANI, "utf-8")
-    system = ft.read(file).model
-    values = inner_values(20)
-    outputs = candidate(system, f"{name}: system").load(1).answer(values).outputs
-    right = find_runtime("reference").load(system)(values).outputs
-    assert outputs is not None
-    assert right is not None
+    outputs, right = both_outputs(name, file)
     np.testing.assert_allclose(outputs, right, atol=1.0)  # of 100, on other samples
     assert np.isnan(outputs[:, 1]).all()
 
@@ -694,19 +695,9 @@ def test_an_engine_concludes_linear_functions(name: str, tmp_path: Path) -> None
     sugeno = "  aggregation: none\n  defuzzifier: WeightedAverage TakagiSugeno\n"
     terms = "  term: slow Linear 1 -2 30\n  term: fast Linear -0.5 4 7.5\n"
     file = tmp_path / "fan.fll"
-    text = (
-        start
-        + sugeno
-        + terms
-        + rules.replace("implication: Minimum", "implication: none")
-    )
-    file.write_text(text, "utf-8")
-    system = ft.read(file).model
-    values = inner_values(20)
-    outputs = candidate(system, f"{name}: system").load(1).answer(values).outputs
-    right = find_runtime("reference").load(system)(values).outputs
-    assert outputs is not None
-    assert right is not None
+    rules = rules.replace("implication: Minimum", "implication: none")
+    file.write_text(start + sugeno + terms + rules, "utf-8")
+    outputs, right = both_outputs(name, file)
     np.testing.assert_allclose(outputs, right, rtol=1e-9)
 
 
