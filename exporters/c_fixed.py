@@ -200,7 +200,7 @@ class FixedSteps(CSteps):
         if step.operation in ("and", "or", "not"):
             return super().expression(step)
         if step.table:
-            return self._looked_up(step, bits)
+            return self._lookup(step, bits)
         if step.operation in _EDGES:
             return self._comparison(step)
         if step.operation in ("multiply", "divide"):
@@ -242,7 +242,7 @@ class FixedSteps(CSteps):
             texts.append(f"({way(exact)})")
         return f"{texts[0]} {self.signs[step.operation]} {texts[1]}"
 
-    def _looked_up(self, step: Step, bits: int) -> str:
+    def _lookup(self, step: Step, bits: int) -> str:
         """Return a place among whole numbers, or the whole number at a place."""
         (place,) = step.arguments
         self.needs.add(step.operation)
@@ -342,7 +342,7 @@ def _in_tables(program: Program) -> Program:
     indexes = {s.samples: p for p, s in enumerate(steps) if s.operation == "index"}
     foreign, turned = set[int](), set[int]()
     for place, step in enumerate(steps):
-        table, values = _combined(steps, step), still[place]
+        table, values = _joint_table(steps, step), still[place]
         if foreign & {*step.arguments} or step.operation not in _OPERATIONS | _TRUTHS:
             foreign.add(place)
             if isinstance(values, list) and step.kind == "number":
@@ -361,7 +361,7 @@ def _in_tables(program: Program) -> Program:
     return replace(program, steps=tuple(steps))
 
 
-def _combined(steps: Sequence[Step], step: Step) -> tuple[int, FloatArray] | None:
+def _joint_table(steps: Sequence[Step], step: Step) -> tuple[int, FloatArray] | None:
     """Return what an operation makes of numbers that stand at one place of tables."""
     operands = [steps[place] for place in step.arguments]
     places = {one.arguments[0] for one in operands if one.operation == "pick"}

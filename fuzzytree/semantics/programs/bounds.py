@@ -31,9 +31,9 @@ from fuzzytree.semantics.programs.spreads import (
     ARRAYS,
     Array,
     Spread,
-    combined,
-    of_truths,
+    number_spread,
     times,
+    truth_spread,
 )
 from fuzzytree.semantics.programs.steps import Program, Step
 
@@ -128,7 +128,7 @@ def _bounds(program: Program, values: npt.NDArray[np.float64]) -> list[Array]:
 
 def _pair(step: Step, operands: Sequence[Pair]) -> Pair:
     if step.kind == "truth":
-        truth = of_truths(step.operation, [_spread(one) for one in operands])
+        truth = truth_spread(step.operation, [_spread(one) for one in operands])
         return truth.low, truth.error
     value, error = _number(step, operands)
     is_exact = np.ones(value.shape, np.bool_)
@@ -211,12 +211,12 @@ def _number(step: Step, operands: Sequence[Pair]) -> Pair:
         unsure = sum(error for _, error in operands)
         return value, np.where(unsure == 0.0, 0.0, np.inf)
     if operation in _OF_BOXES:
-        error = combined(step, [_spread(one) for one in operands]).error
+        error = number_spread(step, [_spread(one) for one in operands]).error
         if operation == "below":
             return np.searchsorted(step.table, operands[0][0]).astype(np.float64), error
         return ARRAYS[operation](*[one for one, _ in operands]), error
     if operation == "pick":
-        return _picked(step, *operands[0])
+        return _table_number(step, *operands[0])
     if operation in ("total", "running", "last", "highest", "lowest"):
         return _over_samples(operation, *operands[0])
     if operation == "where":
@@ -238,7 +238,7 @@ def _monotone(function: Callable[..., Array], a: Array, error: Array) -> Pair:
     return value, gap
 
 
-def _picked(step: Step, a: Array, error: Array) -> Pair:
+def _table_number(step: Step, a: Array, error: Array) -> Pair:
     table = np.array(step.table)
     place = np.where((a >= 0) & (a < len(table)), a, 0).astype(np.intp)
     widest = float(table.max() - table.min())

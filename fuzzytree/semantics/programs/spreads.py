@@ -171,7 +171,7 @@ def _moving(
     operands = [every[one] for one in step.arguments]
     if step.kind == "truth":
         if step.operation not in ("less", "at_most", "equal"):
-            return of_truths(step.operation, operands)
+            return truth_spread(step.operation, operands)
         is_same = len(set(step.arguments)) == 1
         return _compared(step.operation, *operands, is_same=is_same)
     number = _number(program, every, step)
@@ -197,7 +197,7 @@ def _rounded(
     return Spread(low, np.where(np.isnan(high) & ~is_none, np.inf, high), error)
 
 
-def of_truths(operation: str, operands: Sequence[Spread]) -> Spread:
+def truth_spread(operation: str, operands: Sequence[Spread]) -> Spread:
     """Return what `is_finite`, `not`, `and` or `or` is."""
     a, b = operands[0], operands[-1]
     match operation:
@@ -240,12 +240,12 @@ def _compared(operation: str, a: Spread, b: Spread, *, is_same: bool) -> Spread:
 
 def _number(program: Program, every: list[Spread], step: Step) -> Spread:
     """Return a number before it is rounded."""
-    number = combined(step, [every[place] for place in step.arguments])
+    number = number_spread(step, [every[place] for place in step.arguments])
     is_quotient = step.operation == "divide"
     return _mean(program, every, step, number) if is_quotient else number
 
 
-def combined(step: Step, operands: Sequence[Spread]) -> Spread:
+def number_spread(step: Step, operands: Sequence[Spread]) -> Spread:
     """Return what an operation makes of numbers before it is rounded."""
     operation, a, b = step.operation, operands[0], operands[-1]
     low, high, error = a
@@ -286,7 +286,7 @@ def combined(step: Step, operands: Sequence[Spread]) -> Spread:
             gap = np.where(error == 0.0, 0.0, (over - under) * 1.0)
             return Spread(least * 1.0, most * 1.0, gap)
         case "pick":
-            return _picked(np.array(step.table), a)
+            return _table_spread(np.array(step.table), a)
         case "total":
             return Spread(low.sum(axis=0), high.sum(axis=0), error.sum(axis=0))
         case "running":
@@ -305,7 +305,7 @@ def combined(step: Step, operands: Sequence[Spread]) -> Spread:
             return Spread(-nothing, nothing, nothing)
 
 
-def _picked(table: Array, place: Spread) -> Spread:
+def _table_spread(table: Array, place: Spread) -> Spread:
     """Return what numbers of a table can be, between places or, beyond it, anywhere."""
     first, last = place.low - place.error, place.high + place.error
     is_inside = (first >= 0.0) & (last <= len(table) - 1.0)
