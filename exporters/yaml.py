@@ -170,8 +170,7 @@ def _rule_base(rules: RuleBase) -> dict[str, Entry]:
             "if": Short([texts[id(one)] for one in rule.when]),
             "then": rule.then,
         }
-        if rule.support is not None:
-            whole["support"] = rule.support
+        whole |= _support(rule, rules.classes)
         whole |= _probabilities(rule.probabilities, rules.classes)
         listed.append(whole)
     entries["rules"] = listed
@@ -191,8 +190,7 @@ def _tree(tree: FuzzyTree) -> dict[str, Entry]:
         end: dict[str, Entry] = {"leaf": number, "class": leaf.label}
         if leaf.pattern:
             end["pattern"] = leaf.pattern
-        if leaf.support is not None:
-            end["support"] = leaf.support
+        end |= _support(leaf, tree.classes)
         end |= _probabilities(leaf.probabilities, tree.classes)
         leaves.append(Short(end))
     entries["leaves"] = leaves
@@ -292,6 +290,17 @@ def _semantics(semantics: Semantics) -> dict[str, Entry]:
     if semantics.floor is not msgspec.UNSET:
         note = "a weaker raw rule knows nothing like the row"
         entries["floor"] = Noted(semantics.floor, note)
+    return entries
+
+
+def _support(part: Rule | Leaf, classes: Sequence[str]) -> dict[str, Entry]:
+    """Return the training rows of a part; classes left out have none."""
+    entries: dict[str, Entry] = {}
+    if part.support is not None:
+        entries["support"] = part.support
+    if part.counts:
+        counts = zip(classes, part.counts, strict=True)
+        entries["counts"] = Short({name: count for name, count in counts if count})
     return entries
 
 

@@ -255,8 +255,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             >>> import numpy as np
             >>> values, labels = np.array([[1.0], [2.0], [7.0], [8.0]]), [0, 0, 1, 1]
             >>> model = FuzzyTreeClassifier()
-            >>> model.fit(values, labels, sample_weight=[1, 1, 3, 1]).tree_.leaves[1]
-            Leaf(label='1', pattern='1', support=4, probabilities=(0.166666, 0.833334))
+            >>> tree = model.fit(values, labels, sample_weight=[1, 1, 3, 1]).tree_
+            >>> tree.leaves[1].counts
+            (0, 4)
         """
         rows: Any = X, y
         weights = None

@@ -384,6 +384,15 @@ def _grow(chance: random.Random, leaves: int, plan: Plan) -> Plan:
     return plan
 
 
+def _leaf(label: str, number: int, support: int, labels: tuple[str, ...]) -> Leaf:
+    """Return a leaf, a few of whose rows are of the first class."""
+    counts = dict.fromkeys(labels, 0)
+    counts[labels[0]] += support // 4
+    counts[label] += support - support // 4
+    rows = tuple(counts.values()) if number % 3 else ()
+    return Leaf(label, f"pattern {number}", support, counts=rows)
+
+
 def _assemble(
     chance: random.Random,
     columns: tuple[str, ...],
@@ -395,7 +404,7 @@ def _assemble(
 ) -> FuzzyTree:
     total = 1 + max((n for c in plan for kind, n in c if kind == "leaf"), default=1) - 1
     leaves = tuple(
-        Leaf(chance.choice(labels), f"pattern {number}", chance.randint(0, 99))
+        _leaf(chance.choice(labels), number, chance.randint(0, 99), labels)
         for number in range(1, total + 1)
     )
     below = _leaves_below(plan)

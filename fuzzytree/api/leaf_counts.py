@@ -28,7 +28,14 @@ from fuzzytree.learning import (
     refuse_repeated,
     state_content,
 )
-from fuzzytree.model import FuzzyTree, IntArray, ModelSource, Progress, fingerprint
+from fuzzytree.model import (
+    FuzzyTree,
+    IntArray,
+    Leaf,
+    ModelSource,
+    Progress,
+    fingerprint,
+)
 from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import Status
 from fuzzytree.tables import ClassLabels, LearningPiece, LearningRows, in_order
@@ -149,13 +156,22 @@ class LeafCounts:
 
     def learn(self) -> FuzzyTree:
         """Return the tree with the number of rows that each leaf predicts."""
-        support: Counter[int] = Counter()
-        for (end, _), count in self._counts.items():
-            support[end] += count
-        leaves = [
-            msgspec.structs.replace(leaf, support=support[end])
-            for end, leaf in enumerate(self.tree.leaves, 1)
-        ]
+        names = dict(zip(self._labels.keys, self._labels.names(), strict=True))
+        rows: Counter[tuple[int, str]] = Counter()
+        for (end, key), count in self._counts.items():
+            rows[end, names[key]] += count
+        others = {name for _, name in rows} - {*self.tree.classes}
+        leaves: list[Leaf] = []
+        for end, leaf in enumerate(self.tree.leaves, 1):
+            counts = tuple(rows[end, name] for name in self.tree.classes)
+            unknown = sum(rows[end, name] for name in others)
+            leaves.append(
+                msgspec.structs.replace(
+                    leaf,
+                    support=sum(counts) + unknown,
+                    counts=() if unknown else counts,
+                )
+            )
         return msgspec.structs.replace(self.tree, leaves=tuple(leaves))
 
     def confusion(self) -> dict[str, dict[str, int]]:

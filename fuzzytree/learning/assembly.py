@@ -138,7 +138,7 @@ def assembled(
         points: n of the 2n + 1 windows.
         separate_sides: Whether a set's sides are fitted apart.
         keeps_flaws: Whether a polynomial that leaves [0, 1] or rises stays.
-        supports: How many rows of the table reach each leaf.
+        supports: How many rows of the table reach each leaf, by class.
     """
     keys = [
         (-1, node) if axis.is_combined else (int(axis.features[0]), -1)
@@ -565,14 +565,16 @@ def _leaves(
     names: TermNames,
     pattern_names: Sequence[str],
 ) -> tuple[Leaf, ...]:
+    counts = np.rint(supports).astype(np.int64).tolist()
     return tuple(
         Leaf(
             names.classes[label],
             " or ".join(pattern_names[int(p)] for p in owned),
-            round(float(supports[leaf])),
+            sum(rows),
+            counts=tuple(rows),
         )
-        for leaf, (owned, label) in enumerate(
-            zip(sketch.leaves, sketch.leaf_classes, strict=True)
+        for owned, label, rows in zip(
+            sketch.leaves, sketch.leaf_classes, counts, strict=True
         )
     )
 

@@ -342,8 +342,10 @@ class ArrayLearner:
         )
         grown = grow(patterns, rules, lambda share: progress("growing", share))
         leaves = grown.sketch.descend(patterns.rows)
-        size = len(grown.sketch.leaves)
-        supports = tallied(leaves, patterns.row_weights, size)
+        codes = np.repeat(patterns.labels, np.diff(patterns.starts))
+        supports = self._rows_by_class(
+            grown.sketch, leaves, codes, patterns.row_weights
+        )
         facts: dict[str, Any] = {
             "patterns_refused": refused,
             "inseparable": grown.inseparable,
@@ -357,7 +359,10 @@ class ArrayLearner:
         rows, rules = self._rules(ready)
         choice = chosen_tree(rows, rules, self.settings, progress)
         found = finished_tree(choice.tree, rows, ready.sample, ready.moments)
-        supports = tallied(found.leaves, ready.supports, len(found.sketch.leaves))
+        codes = ready.sample.codes
+        supports = self._rows_by_class(
+            found.sketch, found.leaves, codes, ready.supports
+        )
         facts: dict[str, Any] = {
             "chosen": {"splits": _STYLES[choice.style]},
             "inner_accuracy": choice.accuracy,
@@ -365,6 +370,14 @@ class ArrayLearner:
         return _Grown(
             found.sketch, found.patterns, supports, facts, choice.further_rows
         )
+
+    def _rows_by_class(
+        self, sketch: Sketch, leaves: IntArray, codes: IntArray, weights: FloatArray
+    ) -> FloatArray:
+        """Return the weight of rows, shape (leaves, classes)."""
+        shape = len(sketch.leaves), len(self.classes)
+        cells = leaves * shape[1] + codes
+        return tallied(cells, weights, shape[0] * shape[1]).reshape(shape)
 
     def _report(
         self, moments: Moments, sample: Sample, grown: _Grown, made: AssembledTree

@@ -19,12 +19,14 @@ class Leaf(Value, frozen=True):
         support: How many training rows reached it, if known; estimated from a sample
             where learning kept one (`rows_per_class`).
         probabilities: As those of its rule.
+        counts: The support by class, in the order of the model's; empty if unknown.
     """
 
     label: str
     pattern: str = ""
     support: int | None = None
     probabilities: Probabilities = msgspec.UNSET
+    counts: tuple[int, ...] = ()
 
 
 class Branch(Value, frozen=True):

@@ -70,12 +70,14 @@ class Rule(Value, frozen=True):
         support: How many training rows reached it, if known.
         probabilities: Of the classes, in the order of the model's, which
             `fuzzytree.model.probabilities` mixes; unset in a model without any.
+        counts: The support by class, in the order of the model's; empty if unknown.
     """
 
     when: tuple[Proposition, ...]
     then: str
     support: int | None = None
     probabilities: Probabilities = msgspec.UNSET
+    counts: tuple[int, ...] = ()
 
 
 Conjunction = Literal["minimum", "product"]
@@ -348,11 +350,27 @@ def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
                 f"rule {number}: no class {rule.then!r}; "
                 f"{name_choice(rule.then, rules.classes)}",
             )
-        if rule.support is not None and rule.support < 0:
-            yield (*path, "support"), f"rule {number}: the support cannot be below 0"
+        yield from support_mistakes(path, f"rule {number}", rule, len(classes))
         for index, proposition in enumerate(rule.when):
             if id(proposition) not in checked:
                 checked.add(id(proposition))
                 yield from proposition_mistakes(
                     (*path, "when", index), f"rule {number}", proposition, terms
                 )
+
+
+def support_mistakes(
+    path: Path, where: str, part: Rule | Leaf, classes: int
+) -> Iterator[Mistake]:
+    """Yield what is wrong with the training rows of a rule or leaf."""
+    if part.support is not None and part.support < 0:
+        yield (*path, "support"), f"{where}: the support cannot be below 0"
+    if not part.counts:
+        return
+    total = sum(part.counts)
+    if len(part.counts) != classes or min(part.counts) < 0:
+        text = f"{where}: the counts are one of each class, none below 0"
+        yield (*path, "counts"), text
+    elif total != part.support:
+        text = f"{where}: the counts sum to {total}, not to the support"
+        yield (*path, "counts"), text

@@ -34,6 +34,7 @@ from fuzzytree.model.rulebase import (
     refuse,
     shapes_of,
     summary,
+    support_mistakes,
     term_names,
     variable_mistakes,
 )
@@ -235,11 +236,8 @@ def _leaf_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
                 ("leaves", number - 1, "label"),
                 f"leaf {number}: no class {leaf.label!r}",
             )
-        if leaf.support is not None and leaf.support < 0:
-            yield (
-                ("leaves", number - 1, "support"),
-                f"leaf {number}: the support cannot be below 0",
-            )
+        path: Path = ("leaves", number - 1)
+        yield from support_mistakes(path, f"leaf {number}", leaf, len(classes))
 
 
 def node_mistakes(

@@ -201,7 +201,7 @@ class Model:
     def _read_tree(self, top: Facts) -> None:
         self.form, nodes, leaves = "tree", top.get("nodes", []), top["leaves"]
         for leaf in leaves:
-            keys(leaf, "leaf, class", "pattern, support, probabilities")
+            keys(leaf, "leaf, class", "pattern, support, counts, probabilities")
         for node in nodes:
             keys(node, "node, ask, cuts, branches", "interval owners")
             ways = range(1, len(node["branches"]) + 1)
@@ -507,7 +507,7 @@ def _curves(terms: Sequence[Facts]) -> dict[str, Curve]:
 
 
 def _rule(facts: Facts) -> Rule:
-    keys(facts, "if, then", "support, probabilities")
+    keys(facts, "if, then", "support, counts, probabilities")
     conditions = [read_condition([text]) for text in facts["if"]]
     when = [c for c in conditions if isinstance(c, Is) and c.term]
     hedges = {c.hedges for c in when} - {(), ("not",)}

@@ -160,7 +160,7 @@ def _rules(tree: Document, kind: Kind) -> tuple[Rule, ...]:
         if branch.leaf is not None:
             leaf = tree.leaves[branch.leaf - 1]
             shares = leaf.probabilities if kind == "relative" else msgspec.UNSET
-            rules.append(Rule(path, leaf.label, leaf.support, shares))
+            rules.append(Rule(path, leaf.label, leaf.support, shares, leaf.counts))
         elif branch.node is not None:
             node = tree.nodes[branch.node - 1]
             for step in reversed(node.branches):

@@ -238,3 +238,20 @@ def test_a_name_that_no_file_can_hold_is_refused() -> None:
 
 def test_a_choice_of_names_stands_in_one_line() -> None:
     assert name_choice("b", ["a\nb", "c"]) == "there is 'a\\nb', c"
+
+
+@pytest.mark.parametrize(
+    ("counts", "sentence"),
+    [
+        ((3,), "rule 1: the counts are one of each class, none below 0"),
+        ((4, -1), "rule 1: the counts are one of each class, none below 0"),
+        ((3, 1), "rule 1: the counts sum to 4, not to the support"),
+    ],
+)
+def test_counts_by_class_sum_to_the_support(
+    counts: tuple[int, ...], sentence: str
+) -> None:
+    with pytest.raises(InvalidModelError) as caught:
+        RuleBase("x", ("a", "b"), (), (Rule((), "a", support=3, counts=counts),))
+    assert str(caught.value) == sentence
+    assert RuleBase("x", ("a", "b"), (), (Rule((), "a", 3, counts=(1, 2)),)).rules

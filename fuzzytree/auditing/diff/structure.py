@@ -34,8 +34,10 @@ from fuzzytree.model import (
     Document,
     FuzzySystem,
     Path,
+    Rule,
     RuleBase,
     Semantics,
+    SystemRule,
     Variable,
     kind_of,
 )
@@ -224,13 +226,13 @@ class Structure:
         was, now = old.semantics.sharpness, new.semantics.sharpness
         sharpness = f"; the sharpness is {now or 'none'}, and was {was or 'none'}"
         for field, verbs, what in (
-            ("support", ("is", "are"), "supported by another number of rows"),
+            ("support", ("is", "are"), "supported by other training rows"),
             ("probabilities", ("has", "have"), "other probabilities of classes"),
         ):
             rules = [
                 (a + 1, b + 1)
                 for a, b, _ in pairs.matches
-                if getattr(old.rules[a], field) != getattr(new.rules[b], field)
+                if _differ(field, old.rules[a], new.rules[b])
             ]
             is_support, count = field == "support", len(rules)
             if rules or not (is_support or was == now):
@@ -503,6 +505,14 @@ def _range(variable: Any) -> str:
     low = "-inf" if variable.low is None else f"{variable.low!r}"
     high = "inf" if variable.high is None else f"{variable.high!r}"
     return f"{low} to {high}"
+
+
+def _differ(field: str, old: Rule | SystemRule, new: Rule | SystemRule) -> bool:
+    """Return whether a field differs, as far as both rules know it."""
+    if field == "support" and isinstance(old, Rule) and isinstance(new, Rule):
+        both = old.counts and new.counts
+        return old.counts != new.counts if both else old.support != new.support
+    return bool(getattr(old, field) != getattr(new, field))
 
 
 def _text(value: object) -> str:

@@ -281,6 +281,16 @@ Shares = Annotated[
 ]
 
 
+Counts = Annotated[
+    dict[Name, Count],
+    Meta(
+        description="the training rows by class, which sum to the support; classes "
+        "that are left out have none",
+        examples=[{"setosa": 48, "virginica": 2}],
+    ),
+]
+
+
 class RuleOfModel(FileRecord, frozen=True, kw_only=True):
     """If all propositions hold, then the class; support counts training rows."""
 
@@ -288,6 +298,7 @@ class RuleOfModel(FileRecord, frozen=True, kw_only=True):
     if_: Antecedent = field(name="if")
     then: Name
     support: Count | None = None
+    counts: Counts | None = None
     probabilities: Shares | None = None
 
 
@@ -352,6 +363,7 @@ class End(FileRecord, frozen=True, kw_only=True):
     class_: Name = field(name="class")
     pattern: Name | None = None
     support: Count | None = None
+    counts: Counts | None = None
     probabilities: Shares | None = None
 
 

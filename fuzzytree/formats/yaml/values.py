@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import get_args
 
 import msgspec
@@ -260,7 +260,21 @@ def leaf(
 ) -> Leaf:
     """Return a leaf."""
     shares = probabilities(path, one.probabilities, classes, mistakes)
-    return Leaf(one.class_, one.pattern or "", one.support, shares)
+    rows = counts(path, one.counts, classes, mistakes)
+    return Leaf(one.class_, one.pattern or "", one.support, shares, rows)
+
+
+def counts(
+    path: Path,
+    listed: Mapping[str, int] | None,
+    classes: Sequence[str],
+    mistakes: list[Mistake],
+) -> tuple[int, ...]:
+    """Return the training rows of each class, none where they are unknown."""
+    if listed is None:
+        return ()
+    _check_classes((*path, "counts"), listed, classes, mistakes)
+    return tuple(listed.get(name, 0) for name in classes)
 
 
 def probabilities(
@@ -273,9 +287,7 @@ def probabilities(
     if listed is None:
         return msgspec.UNSET
     place = (*path, "probabilities")
-    for name in listed:
-        if name not in classes:
-            mistakes.append((place, f"no class {name!r}; {name_choice(name, classes)}"))
+    _check_classes(place, listed, classes, mistakes)
     others = len(classes) - len(listed)
     rest = PARTS - sum(parts_of(tuple(listed.values())))
     if others > 0 and rest % others:
@@ -283,6 +295,18 @@ def probabilities(
         mistakes.append((place, text))
     share = rest // max(others, 1) / PARTS
     return tuple(listed.get(name, share) for name in classes)
+
+
+def _check_classes(
+    path: Path,
+    listed: Iterable[str],
+    classes: Sequence[str],
+    mistakes: list[Mistake],
+) -> None:
+    """Report names that are no class."""
+    for name in listed:
+        if name not in classes:
+            mistakes.append((path, f"no class {name!r}; {name_choice(name, classes)}"))
 
 
 def sets(path: Path, one: layout.SetsOfVariable, mistakes: list[Mistake]) -> Sets:

@@ -174,7 +174,8 @@ def _rules(
             )
             mistakes.append(((*path, "when"), f"rule {position + 1}: {text}"))
         shares = values.probabilities(path, one.probabilities, classes, mistakes)
-        rules.append(Rule(propositions, one.then, one.support, shares))
+        rows = values.counts(path, one.counts, classes, mistakes)
+        rules.append(Rule(propositions, one.then, one.support, shares, rows))
     return tuple(rules)
 
 

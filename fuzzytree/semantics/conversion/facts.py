@@ -73,7 +73,8 @@ class _Facts(Value, frozen=True):
     """A rule base without its curves, and how it became a system.
 
     Propositions are (place of the variable, places of its terms, whether it is
-    negated); rules are (places of the propositions, place of the class, support).
+    negated); rules are (places of the propositions, place of the class, support, or the
+    counts that sum to it).
     """
 
     fuzzytree: int
@@ -86,7 +87,7 @@ class _Facts(Value, frozen=True):
     semantics: Semantics
     variables: tuple[_Named, ...]
     propositions: tuple[tuple[int, tuple[int, ...], bool], ...]
-    rules: tuple[tuple[tuple[int, ...], int, int | None], ...]
+    rules: tuple[tuple[tuple[int, ...], int, int | tuple[int, ...] | None], ...]
     probabilities: tuple[Probabilities, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
@@ -148,7 +149,11 @@ def facts_of(
             for proposition in propositions
         ),
         rules=tuple(
-            (tuple(number[c] for c in rule.when), labels[rule.then], rule.support)
+            (
+                tuple(number[c] for c in rule.when),
+                labels[rule.then],
+                rule.counts or rule.support,
+            )
             for rule in rules.rules
         ),
         probabilities=tuple(rule.probabilities for rule in rules.rules)
@@ -399,10 +404,11 @@ def _rules(facts: _Facts, curves: Mapping[int, Sequence[Term]]) -> RuleBase:
         Rule(
             tuple(propositions[k] for k in places),
             facts.classes[label],
-            support,
+            sum(rows) if isinstance(rows, tuple) else rows,
             shares,
+            rows if isinstance(rows, tuple) else (),
         )
-        for (places, label, support), shares in zip(facts.rules, vectors, strict=True)
+        for (places, label, rows), shares in zip(facts.rules, vectors, strict=True)
     )
     return RuleBase(
         facts.name,

@@ -127,7 +127,7 @@ def test_names_units_and_notes_are_cosmetic() -> None:
     assert sentences(found) == [
         ("cosmetic", "the unit of 'force' is 'kN', and was 'N'"),
         ("cosmetic", "the term 'soft' of 'force' is called 'weak'"),
-        ("cosmetic", "1 rule is supported by another number of rows"),
+        ("cosmetic", "1 rule is supported by other training rows"),
         ("cosmetic", "the model 'grip' is called 'gripper'"),
     ]
     assert all(change.is_proved for change in found.changes)

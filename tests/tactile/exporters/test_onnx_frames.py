@@ -170,7 +170,7 @@ def test_a_model_of_one_leaf_reports_something_from_nothing() -> None:
 
 def _one_leaf() -> FuzzyTree:
     tree = learnt_tree(SMALL, ("area",))
-    leaf = replace(tree.leaves[0], label="thing", probabilities=(1.0,))
+    leaf = replace(tree.leaves[0], label="thing", probabilities=(1.0,), counts=())
     return replace(
         tree, classes=("thing",), variables=(), nodes=(), leaves=(leaf,), sets=()
     )
