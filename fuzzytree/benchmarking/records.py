@@ -7,7 +7,7 @@ from typing import Literal
 
 import msgspec
 
-from fuzzytree.model import FloatArray, IntArray
+from fuzzytree.model import FloatArray, IntArray, Result, summary
 from fuzzytree.semantics import Form
 
 Question = Form
@@ -235,7 +235,7 @@ class Front(msgspec.Struct, frozen=True):
     names: tuple[str, ...]
 
 
-class Study(msgspec.Struct, frozen=True):
+class Study(Result, msgspec.Struct, frozen=True):
     """Error against run time for one model.
 
     Attributes:
@@ -267,6 +267,10 @@ class Study(msgspec.Struct, frozen=True):
     seed: int = 0
     seconds: float = 0.0
     is_interrupted: bool = False
+
+    def __repr__(self) -> str:
+        """Show how much was measured, and how much was left out."""
+        return summary("Study", points=len(self.points), omissions=len(self.omissions))
 
     def to_json(self) -> str:
         """Return the same facts for programs, every raw timing included."""

@@ -20,7 +20,16 @@ from fuzzytree.checking import Needs, needs, prove, sizes_of
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters import write_onnx as write_onnx
-from fuzzytree.model import Agreement, Document, Dtype, Progress, Use, Variable, summary
+from fuzzytree.model import (
+    Agreement,
+    Document,
+    Dtype,
+    Progress,
+    Result,
+    Use,
+    Variable,
+    summary,
+)
 from fuzzytree.runtimes import baseline, open_onnx
 from fuzzytree.semantics import Pruned, Removed, forms, probe_values
 from fuzzytree.tables import batches, path_of
@@ -93,7 +102,7 @@ class Cost(msgspec.Struct, frozen=True):
     timing: Timing
 
 
-class Footprint(msgspec.Struct, frozen=True):
+class Footprint(Result, msgspec.Struct, frozen=True):
     """What a model needs, what was left out, what that saves, and the proof.
 
     Attributes:

@@ -12,13 +12,14 @@ import msgspec
 import numpy as np
 
 from fuzzytree.errors import LearningError
+from fuzzytree.model import Result
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray, IntArray
     from fuzzytree.tables import Table
 
 
-class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
+class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
     """How a tree came about, and how its table departed from the paper's assumptions.
 
     Attributes:

@@ -14,6 +14,7 @@ from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.splitting import Style
 from fuzzytree.learning.units import FloatArray
+from fuzzytree.model import Result
 
 LEAVES = (2, 3, 4, 5, 6, 8, 10, 12, 16, 20)
 """Numbers of leaves that are shown."""
@@ -21,7 +22,7 @@ LEAVES = (2, 3, 4, 5, 6, 8, 10, 12, 16, 20)
 _COLUMNS = (1, 2, 3)
 
 
-class Front(msgspec.Struct, frozen=True):
+class Front(Result, msgspec.Struct, frozen=True):
     """The share of rows that small trees answer right, rows that were held out.
 
     Attributes:

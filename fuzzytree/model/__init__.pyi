@@ -139,7 +139,6 @@ from .rulebase import label_type_of as label_type_of
 from .rulebase import naming_mistakes as naming_mistakes
 from .rulebase import proposition_text as proposition_text
 from .rulebase import sentence as sentence
-from .rulebase import summary as summary
 from .rules import Activation as Activation
 from .rules import ActivationMethod as ActivationMethod
 from .rules import And as And
@@ -173,7 +172,9 @@ from .tree import node_mistakes as node_mistakes
 from .tree import outline as outline
 from .tree import root_of as root_of
 from .tree import with_label_type as with_label_type
+from .values import Result as Result
 from .values import Value as Value
+from .values import summary as summary
 from .variables import DATE_UNIT as DATE_UNIT
 from .variables import Part as Part
 from .variables import Term as Term

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import ClassVar, Literal
 
 import msgspec
 
 from fuzzytree.errors import DisagreementError
 from fuzzytree.model.rulebase import Kind
+from fuzzytree.model.values import Result
 
 Basis = Literal["file", "proof", "all cells", "rows", "calls"]
 Verdict = Literal["agrees", "rows only", "DISAGREES", "differs by design"]
@@ -215,7 +215,7 @@ class CheckSettings(msgspec.Struct, frozen=True, kw_only=True):
     tolerance: float = TOLERANCE
 
 
-class Agreement(msgspec.Struct, frozen=True):
+class Agreement(Result, msgspec.Struct, frozen=True):
     """The result of a check.
 
     Attributes:
@@ -265,12 +265,6 @@ class Agreement(msgspec.Struct, frozen=True):
         count = len(self.comparisons)
         verdict = "agrees" if self.ok else "DISAGREES"
         return f"Agreement({count} comparison{'s' * (count != 1)}, {verdict})"
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        page = importlib.import_module("fuzzytree.report.notebook")
-        shown: str = page.agreement_html(self)
-        return shown
 
     def to_json(self) -> str:
         """Return the same facts for programs, as indented JSON."""

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, Self, TypeAlias
 import msgspec
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.rulebase import Path, RuleBase, summary
+from fuzzytree.model.rulebase import Path, RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.model.values import ModelKind as ModelKind
+from fuzzytree.model.values import summary
 
 if TYPE_CHECKING:
     import numpy as np

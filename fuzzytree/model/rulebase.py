@@ -32,7 +32,7 @@ from fuzzytree.model.probabilities import (
     sharpness_mistakes,
 )
 from fuzzytree.model.rules import Proposition as Proposition
-from fuzzytree.model.values import AnyModel, ModelKind
+from fuzzytree.model.values import AnyModel, ModelKind, summary
 from fuzzytree.model.values import Value as Value
 from fuzzytree.model.variables import DATE_UNIT as DATE_UNIT
 from fuzzytree.model.variables import Part as Part
@@ -44,21 +44,6 @@ from fuzzytree.model.variables import term_names as term_names
 from fuzzytree.model.variables import variable_mistakes as variable_mistakes
 
 _NO_COLUMN = b',"categories":[],"missing":null}'  # in no text: quotes are escaped there
-_ONE = {"leaves": "leaf", "classes": "class", "losses": "loss"}
-
-
-def summary(name: str, **counts: int) -> str:
-    """Return what `repr` shows of something large: its name and how much it holds.
-
-    Example:
-        >>> summary("RuleBase", rules=3, classes=1)
-        'RuleBase(3 rules, 1 class)'
-    """
-    shown = (
-        f"{count} {noun if count != 1 else _ONE.get(noun, noun.removesuffix('s'))}"
-        for noun, count in counts.items()
-    )
-    return f"{name}({', '.join(shown)})"
 
 
 class Rule(Value, frozen=True):

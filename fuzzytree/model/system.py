@@ -33,7 +33,7 @@ from fuzzytree.model.mistakes import (
 )
 from fuzzytree.model.nodes import Leaf, Node, Sets
 from fuzzytree.model.norms import SNorm
-from fuzzytree.model.rulebase import Semantics, summary
+from fuzzytree.model.rulebase import Semantics
 from fuzzytree.model.rules import (
     Conclusion,
     RuleBlock,
@@ -43,7 +43,7 @@ from fuzzytree.model.rules import (
     condition_mistakes,
     reference_mistakes,
 )
-from fuzzytree.model.values import AnyModel, ModelKind, Value
+from fuzzytree.model.values import AnyModel, ModelKind, Value, summary
 from fuzzytree.model.variables import (
     Part,
     Term,

@@ -33,12 +33,11 @@ from fuzzytree.model.rulebase import (
     proposition_mistakes,
     refuse,
     shapes_of,
-    summary,
     support_mistakes,
     term_names,
     variable_mistakes,
 )
-from fuzzytree.model.values import AnyModel, ModelKind
+from fuzzytree.model.values import AnyModel, ModelKind, summary
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import Document

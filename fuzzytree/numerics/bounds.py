@@ -30,6 +30,7 @@ from fuzzytree.model import (
     Model,
     ModelKind,
     Proposition,
+    Result,
     Variable,
 )
 from fuzzytree.numerics.enclosures import axis_value, filled_values
@@ -188,7 +189,7 @@ class ValueBound(msgspec.Struct, frozen=True):
     error: float
 
 
-class Certificate(msgspec.Struct, frozen=True):
+class Certificate(Result, msgspec.Struct, frozen=True):
     """What a number type can change about a model's answers, at most.
 
     Attributes:
@@ -214,6 +215,10 @@ class Certificate(msgspec.Struct, frozen=True):
     reasons: tuple[str, ...] = ()
     rows: int | None = None
     unbounded: int = 0
+
+    def __repr__(self) -> str:
+        """Show the number type, and the largest error of a strength."""
+        return f"Certificate({self.dtype}, {self.representation}, delta={self.delta})"
 
     @property
     def sentence(self) -> str:

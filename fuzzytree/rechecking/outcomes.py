@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections import Counter, defaultdict
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
@@ -85,6 +86,19 @@ class Report:
         way = "read and evaluated again" if by == "recheck" else f"confirmed by {by}"
         self.counts[f"{kind}, {way}"] += 1
         self.confirmed[place] = by
+
+    def __repr__(self) -> str:
+        """Show how many answers there are, and how many points are wrong."""
+        return f"Report({len(self.answers)} answers, {len(self.wrong)} wrong)"
+
+    def __str__(self) -> str:
+        """Return what the command line prints."""
+        return "\n".join(self.lines())
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        style = "font-family: monospace; line-height: 1.3; white-space: pre"
+        return f'<pre style="{style}">{html.escape(str(self))}</pre>'
 
     def lines(self) -> Iterator[str]:
         """Yield the report, line by line."""

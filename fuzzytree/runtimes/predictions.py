@@ -5,22 +5,32 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, TypeVar
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import (
+    TYPE_CHECKING,
+    Literal,
+    Self,
+    SupportsIndex,
+    TypeVar,
+    overload,
+)
 
 import msgspec
 import numpy as np
 
+from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.model import (
     Document,
     FuzzySystem,
     Label,
     LabelType,
     Model,
+    Result,
     RuleBase,
     Shape,
     Variable,
     label_of,
+    name_choice,
     proposition_text,
     shapes_of,
     summary,
@@ -30,7 +40,9 @@ from fuzzytree.semantics import Status, axis_values, evaluate, proposition_degre
 from fuzzytree.tables import pandas_frame
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     import pandas as pd
+    import polars as pl
     import pyarrow as pa
 
     from fuzzytree.model import FloatArray, IntArray, Outcome
@@ -42,7 +54,7 @@ S = TypeVar("S", bound=msgspec.Struct)
 _WORDS = [status.name.lower() for status in Status]
 
 
-class Answers(msgspec.Struct, frozen=True, eq=False, kw_only=True):
+class Answers(Result, msgspec.Struct, frozen=True, eq=False, kw_only=True):
     """What a model answers for some rows.
 
     Attributes:
@@ -57,6 +69,14 @@ class Answers(msgspec.Struct, frozen=True, eq=False, kw_only=True):
     def __len__(self) -> int:
         """Return the number of rows."""
         return len(self.status)
+
+    def _slice(self, rows: slice) -> Self:
+        arrays = {
+            name: value[..., rows]
+            for name in self.__struct_fields__
+            if isinstance(value := getattr(self, name), np.ndarray)
+        }
+        return msgspec.structs.replace(self, **arrays)
 
     def count(self, status: int) -> int:
         """Return how many rows have this `fuzzytree.semantics.reference.Status`."""
@@ -115,6 +135,21 @@ class Answers(msgspec.Struct, frozen=True, eq=False, kw_only=True):
         """
         return pandas_frame(self.columns(strengths))
 
+    def to_polars(self, strengths: By | None = None) -> pl.DataFrame:
+        """Return the columns of `to_arrow` as a frame of polars; needs polars.
+
+        Raises:
+            MissingExtraError: If polars is not installed.
+            ValueError: If strengths are requested that are not there.
+        """
+        try:
+            import polars as pl
+        except ImportError as error:
+            text = f"to_polars needs {install_hint('polars')}"
+            raise MissingExtraError(text) from error
+
+        return pl.DataFrame(self.to_arrow(strengths))
+
     def _answers(self) -> dict[str, Sequence[object]]:
         """Return the columns of the answers alone."""
         raise NotImplementedError
@@ -155,7 +190,10 @@ def _status_title(taken: Collection[str]) -> str:
 
 
 class Predictions(Answers, frozen=True, eq=False):
-    """The classes that a model predicts for some rows.
+    """The classes that a model predicts for some rows: a sequence of labels.
+
+    It has a length and can be indexed, sliced and iterated; `np.asarray` makes an array
+    of it, and metrics of scikit-learn take it. A row without a class is None.
 
     Attributes:
         choices: The classes that the model can predict.
@@ -173,6 +211,32 @@ class Predictions(Answers, frozen=True, eq=False):
     owners: tuple[int, ...] = ()
     label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
     probabilities: FloatArray | None = None
+
+    @overload
+    def __getitem__(self, row: SupportsIndex) -> Label | None: ...
+    @overload
+    def __getitem__(self, row: slice) -> Predictions: ...
+    def __getitem__(self, row: SupportsIndex | slice) -> Label | Predictions | None:
+        """Return the class of a row, or the predictions of some rows."""
+        if isinstance(row, slice):
+            return self._slice(row)
+        code = self.codes[row]
+        return None if code < 0 else label_of(self.choices[code], self.label_type)
+
+    def __iter__(self) -> Iterator[Label | None]:
+        """Yield the class of each row."""
+        return iter(self.classes)
+
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[np.generic]:
+        """Return the class of each row; of objects if a row has none."""
+        if copy is False:
+            raise ValueError("an array of predictions is a copy")
+        labels = [label_of(name, self.label_type) for name in self.choices]
+        has_none = bool(np.any(self.codes < 0))
+        table = np.array([*labels, None] if has_none else labels)
+        return table[self.codes].astype(dtype or table.dtype, copy=False)
 
     @property
     def classes(self) -> list[Label | None]:
@@ -421,7 +485,11 @@ def _short(degree: float) -> str:
 
 
 class Outputs(Answers, frozen=True, eq=False):
-    """The numbers that a fuzzy system computes for some rows.
+    """The numbers that a fuzzy system computes for some rows: a sequence of them.
+
+    It has a length and can be indexed, sliced and iterated: a row is its number, or a
+    tuple of numbers if there are several outputs. `np.asarray` makes an array of it, of
+    shape (rows,) or (rows, outputs). The name of an output gives its numbers.
 
     A row is uncovered if an output got no conclusion and has its default; a rule's
     strength is its degree of activation.
@@ -435,10 +503,39 @@ class Outputs(Answers, frozen=True, eq=False):
     names: tuple[str, ...]
     values: FloatArray
 
-    def __getitem__(self, name: str) -> FloatArray:
-        """Return the numbers of an output, one for each row."""
-        numbers: FloatArray = self.values[self.names.index(name)]
-        return numbers
+    @overload
+    def __getitem__(self, row: str) -> FloatArray: ...
+    @overload
+    def __getitem__(self, row: SupportsIndex) -> float | tuple[float, ...]: ...
+    @overload
+    def __getitem__(self, row: slice) -> Outputs: ...
+    def __getitem__(
+        self, row: str | SupportsIndex | slice
+    ) -> FloatArray | float | tuple[float, ...] | Outputs:
+        """Return the numbers of an output, of a row, or the outputs of some rows.
+
+        Raises:
+            ValueError: If there is no output of a name.
+        """
+        if isinstance(row, slice):
+            return self._slice(row)
+        if isinstance(row, str):
+            if row not in self.names:
+                raise ValueError(f"no output {row!r}; {name_choice(row, self.names)}")
+            numbers: FloatArray = self.values[self.names.index(row)]
+            return numbers
+        return _row_numbers(self.values[:, row].tolist())
+
+    def __iter__(self) -> Iterator[float | tuple[float, ...]]:
+        """Yield the numbers of each row."""
+        return map(_row_numbers, self.values.T.tolist())
+
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[np.generic]:
+        """Return the numbers, of shape (rows,) or (rows, outputs)."""
+        table = self.values[0] if len(self.names) == 1 else self.values.T
+        return np.array(table, dtype) if copy else np.asarray(table, dtype)
 
     def spans(self) -> dict[str, tuple[float, float]]:
         """Return the least and the largest number of each output that has one."""
@@ -477,3 +574,7 @@ class Outputs(Answers, frozen=True, eq=False):
 
 def _cells(row: FloatArray) -> list[object]:
     return ["" if math.isnan(value) else value for value in row.tolist()]
+
+
+def _row_numbers(numbers: Sequence[float]) -> float | tuple[float, ...]:
+    return numbers[0] if len(numbers) == 1 else tuple(numbers)

@@ -51,8 +51,20 @@ def test_outputs_become_frames_with_nothing_where_there_is_no_number() -> None:
 
 def test_an_output_is_found_by_its_name() -> None:
     assert FOUND["fan"][2] == 2.5
-    with pytest.raises(ValueError, match="not in tuple"):
+    with pytest.raises(ValueError, match="no output 'heat'; there is fan, status"):
         FOUND["heat"]
+
+
+def test_outputs_are_a_sequence_of_the_numbers_of_each_row() -> None:
+    assert FOUND[0] == (1.0, 0.0)
+    assert [row[1] for row in FOUND if isinstance(row, tuple)][:2] == [0.0, 0.0]
+    assert FOUND[:1]["fan"].tolist() == [1.0]
+    assert np.asarray(FOUND).shape == (3, 2)
+    one = Outputs(("y",), np.array([[1.0, 2.0]]), status=np.array([0, 0]))
+    assert ([*one], one[1]) == ([1.0, 2.0], 2.0)
+    assert np.asarray(one).tolist() == [1.0, 2.0]
+    with pytest.raises(IndexError):
+        one[2]
 
 
 def test_what_was_out_of_the_ordinary_is_counted() -> None:

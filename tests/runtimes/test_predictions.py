@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.errors import MissingExtraError
+from fuzzytree.model import Label
 from fuzzytree.model.rulebase import (
     Band,
     Proposition,
@@ -165,3 +166,62 @@ def test_answers_become_frames_with_nothing_where_nothing_is_known() -> None:
         "strength of class firm": [0.5, 0.0, None],
         "strength of class hard": [0.0, 0.0, None],
     }
+
+
+def test_predictions_are_a_sequence_of_labels() -> None:
+    codes, rule, status = np.array([1, 0, -1]), np.array([2, 1, 0]), np.array([0, 0, 2])
+    answers = Predictions(("no", "yes"), codes, rule, status=status)
+    assert [*answers] == [answers[row] for row in range(3)] == ["yes", "no", None]
+    assert (answers[-2], answers[np.int64(0)], len(answers[1:])) == ("no", "yes", 2)
+    assert answers[1:].rule.tolist() == [1, 0]
+    assert answers[::-1].classes == [None, "no", "yes"]
+    assert "yes" in answers
+    assert np.asarray(answers).tolist() == ["yes", "no", None]
+    assert np.asarray(answers[:2]).dtype.kind == "U"
+    with pytest.raises(IndexError):
+        answers[3]
+    with pytest.raises(ValueError, match="an array of predictions is a copy"):
+        np.array(answers, copy=False)
+
+
+@pytest.mark.parametrize("labels", [["a", "b"], [3, 7], [True, False], [0.5, 2.0]])
+def test_a_metric_of_scikit_learn_takes_predictions(labels: list[Label]) -> None:
+    metrics = pytest.importorskip("sklearn.metrics")
+    values = np.array([[1.0], [1.5], [2.0], [7.0], [7.5], [8.0]])
+    target = [labels[0]] * 3 + [labels[1]] * 3
+    predictions = ft.run(ft.learn(values, target=target), values)
+    array = np.asarray(predictions)
+    assert array.tolist() == target
+    assert [type(label) for label in array.tolist()] == [*map(type, target)]
+    if not isinstance(labels[0], float):  # which metrics take for measurements
+        assert metrics.accuracy_score(target, predictions) == 1.0
+        assert metrics.accuracy_score([labels[0]] * 6, predictions) == 0.5
+
+
+def test_a_slice_keeps_strengths_and_probabilities() -> None:
+    values = np.arange(9.0)[:, None]
+    tree = ft.learn(values, target=["no"] * 4 + ["yes"] * 5)
+    rules = ft.rules_from_tree(tree)
+    answers = ft.run(rules, values, with_strengths=True, with_probabilities=True)
+    few, lines = answers[2:5], answers.to_csv("rule").splitlines()
+    assert few.to_csv("rule").splitlines() == [lines[0], *lines[3:6]]
+    assert "probability of class no" in lines[0]
+
+
+def test_a_frame_of_polars_has_the_columns_of_arrow() -> None:
+    pl = pytest.importorskip("polars")
+    codes, rule, status = np.array([1, -1]), np.array([2, 0]), np.array([0, 2])
+    answers = Predictions(("no", "yes"), codes, rule, status=status)
+    frame = answers.to_polars()
+    assert frame["class"].to_list() == ["yes", None]
+    assert frame["rule"].dtype == pl.Int32
+    assert frame["status"].cast(pl.String).to_list() == ["decided", "uncovered"]
+
+
+def test_polars_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "polars", None)
+    answers = Predictions(("no",), *np.array([[0], [1]]), status=np.array([0]))
+    with pytest.raises(MissingExtraError) as caught:
+        answers.to_polars()
+    text = "to_polars needs polars: pip install 'polars>=1.34'"
+    assert str(caught.value) == text

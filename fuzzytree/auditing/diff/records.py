@@ -21,7 +21,7 @@ from fuzzytree.auditing.findings.records import (
     Measure,
     SourceFile,
 )
-from fuzzytree.model import Value
+from fuzzytree.model import Result, Value
 
 FORMAT: Final = "fuzzytree-diff/1"
 
@@ -78,7 +78,7 @@ class ComparedModel(Value, frozen=True):
     file: SourceFile | None = None
 
 
-class Difference(Value, frozen=True):
+class Difference(Result, Value, frozen=True):
     """What has changed from one model to another, and which decisions do.
 
     Attributes:

@@ -21,11 +21,11 @@ from fuzzytree.auditing.findings.records import (
     Severity,
     TermName,
 )
-from fuzzytree.model import Value
+from fuzzytree.model import Result, Value
 from fuzzytree.rechecking import MESSAGES, names_in, sentence_of
 
 
-class Code(Value, frozen=True):
+class Code(Result, Value, frozen=True):
     """A kind of question, and what `explain` says of it.
 
     `severity` is that of a finding unless it says otherwise; `decision` is `strongest`

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 from collections.abc import Collection, Mapping, Sequence
 from typing import Final, Literal
@@ -11,7 +10,7 @@ import msgspec
 
 from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.decide.states import Span, State
-from fuzzytree.model import Value, summary
+from fuzzytree.model import Result, Value, summary
 from fuzzytree.rechecking import LIMITS as LIMITS
 from fuzzytree.rechecking import digest_of as digest_of_facts
 
@@ -164,7 +163,7 @@ class Policy(Value, frozen=True):
     missing: str | None = None
 
 
-class Audit(Value, frozen=True):
+class Audit(Result, Value, frozen=True):
     """The result of an audit.
 
     Attributes:
@@ -220,11 +219,6 @@ class Audit(Value, frozen=True):
         """Show how many answers there are, and how many of them are findings."""
         findings = len(self.open_findings)
         return summary("Audit", answers=len(self.answers), findings=findings)
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        page = importlib.import_module("fuzzytree.report.notebook")
-        return str(page.audit_html(self))
 
     def to_json(self) -> str:
         """Return the audit for programs, and for `recheck`, as indented JSON."""

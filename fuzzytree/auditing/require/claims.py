@@ -7,7 +7,7 @@ from typing import Final, Literal, NamedTuple
 
 import msgspec
 
-from fuzzytree.model import Value
+from fuzzytree.model import Result, Value, summary
 
 FORMAT: Final = "fuzzytree-require/1"
 
@@ -90,7 +90,7 @@ class RequirementAnswer(Value, frozen=True):
     predictions: tuple[str, ...] = ()
 
 
-class Compliance(Value, frozen=True):
+class Compliance(Result, Value, frozen=True):
     """Which requirements a model meets.
 
     Attributes:
@@ -108,6 +108,11 @@ class Compliance(Value, frozen=True):
     steps: int
     answers: tuple[RequirementAnswer, ...]
     format: Literal["fuzzytree-require/1"] = FORMAT
+
+    def __repr__(self) -> str:
+        """Show how many requirements there are, and how many of them are proved."""
+        count, proved = len(self.answers), self.count("PROVED")
+        return summary("Compliance", requirements=count, proved=proved)
 
     @property
     def ok(self) -> bool:

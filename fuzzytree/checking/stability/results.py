@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 import msgspec
 
-from fuzzytree.model import version
+from fuzzytree.model import Result, summary, version
 
 Verdict = Literal["holds", "FAILS", "not applicable"]
 
@@ -89,7 +89,7 @@ class Stiff(msgspec.Struct, frozen=True):
     moves: tuple[Move, ...] = ()
 
 
-class Stability(msgspec.Struct, frozen=True):
+class Stability(Result, msgspec.Struct, frozen=True):
     """Is a model numerically stable: the result of all criteria.
 
     Attributes:
@@ -113,6 +113,11 @@ class Stability(msgspec.Struct, frozen=True):
     runtimes: tuple[str, ...]
     criteria: tuple[Criterion, ...]
     stiff: tuple[Stiff, ...] = ()
+
+    def __repr__(self) -> str:
+        """Show how many criteria were applied, and how they end."""
+        verdict = "holds" if self.ok else "FAILS"
+        return f"{summary('Stability', criteria=len(self.criteria))[:-1]}, {verdict})"
 
     @property
     def ok(self) -> bool:
