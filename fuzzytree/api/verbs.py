@@ -27,6 +27,14 @@ from fuzzytree import (
 from fuzzytree.api.answering import Carried, opened
 from fuzzytree.api.answering import run as run
 from fuzzytree.api.engines import engine_of
+from fuzzytree.api.settings import (
+    AuditArguments,
+    BenchArguments,
+    CheckArguments,
+    DrawArguments,
+    check_arguments,
+    with_arguments,
+)
 from fuzzytree.checking import convert as convert
 from fuzzytree.checking import export as export
 from fuzzytree.checking import load as load
@@ -348,6 +356,7 @@ def check(
     settings: CheckSettings | None = None,
     allow_loss: bool = False,
     progress: Progress | None = None,
+    **options: Unpack[CheckArguments],
 ) -> Agreement:
     """Compare a model with everything that is made of it, in every runtime.
 
@@ -361,8 +370,10 @@ def check(
         settings: How many probes, and what is accepted; see `CheckSettings`.
         allow_loss: As in `load`, for every file.
         progress: Called with what is compared next and the share that is done.
+        options: Settings by name, such as `tolerance=1e-3`, which go before `settings`.
 
     Raises:
+        TypeError: If there is no setting of a name.
         ReadError: If a file cannot be read, or holds another kind of model.
         MissingExtraError: If what runs a file is not installed.
         LossError: As `load`.
@@ -374,7 +385,8 @@ def check(
         >>> check(random_tree(1), runtimes=["native"]).ok
         True
     """
-    chosen = settings or CheckSettings()
+    check_arguments(check, options, CheckArguments)
+    chosen = with_arguments(settings or CheckSettings(), options)
     first = checking.as_model(model, allow_loss=allow_loss)
     titles = [
         os.fspath(other) if isinstance(other, str | os.PathLike) else f"file {number}"
@@ -453,6 +465,7 @@ def bench(
     skip: Sequence[str] = (),
     settings: benchmarking.BenchSettings | None = None,
     progress: Progress | None = None,
+    **options: Unpack[BenchArguments],
 ) -> benchmarking.Study:
     """Measure error against run time for every way of running a model.
 
@@ -467,23 +480,25 @@ def bench(
             seconds it may take, and a module with further candidates, whose code is
             run; the defaults of `BenchSettings` unless given.
         progress: Called with the current step and the share that is done.
+        options: Settings by name, such as `budget_s=60`, which go before `settings`.
 
     Returns:
         The study. After Ctrl-C it holds what was measured by then.
 
     Raises:
+        TypeError: If there is no setting of a name.
         ReadError: If the model cannot be read.
         TableError: If a column is absent or holds text, or the table has no row.
         ValueError: If a number is out of its range, or a name is unknown.
 
     Example:
-        >>> from fuzzytree import BenchSettings
         >>> from fuzzytree.testing import random_tree
-        >>> few = BenchSettings(rows=(9,), budget_s=9)
-        >>> study = bench(random_tree(1), select=["native"], settings=few)
+        >>> study = bench(random_tree(1), select=["native"], rows=(9,), budget_s=9)
         >>> [point.question for point in study.points]
         ['tree', 'relative rules', 'raw rules']
     """
+    check_arguments(bench, options, BenchArguments)
+    plan = with_arguments(settings or benchmarking.BenchSettings(), options)
     first, path = checking.as_model(model), path_of(data)
     return benchmarking.bench(
         first,
@@ -491,7 +506,7 @@ def bench(
         data=Path(path).name if path else "the table",
         select=select,
         skip=skip,
-        plan=settings,
+        plan=plan,
         progress=progress,
     )
 
@@ -524,6 +539,7 @@ def audit(
     settings: auditing.AuditSettings | None = None,
     repeat: str = "",
     progress: Progress | None = None,
+    **options: Unpack[AuditArguments],
 ) -> auditing.Audit:
     """Search a rule base for dead rules, gaps, conflicts and other findings.
 
@@ -539,8 +555,11 @@ def audit(
         settings: What counts as small, and the budget of time.
         repeat: The command that repeats the audit, for the answers.
         progress: Called with the current step and the share that is done.
+        options: Fields of `domain`, `selection` and `settings` by name, such as
+            `select=["FT1"], budget=5`, which go before these.
 
     Raises:
+        TypeError: If there is no setting of a name.
         ReadError: If the file cannot be read.
         LossError: As `load`.
         TableError: If a column is absent or holds text, or the table has no row.
@@ -548,15 +567,14 @@ def audit(
             limits.
 
     Example:
-        >>> from fuzzytree import AuditSelection
         >>> from fuzzytree.testing import random_tree
-        >>> wanted = AuditSelection(select=["FT501"])
-        >>> audit(random_tree(1), selection=wanted).is_complete
+        >>> audit(random_tree(1), select=["FT501"]).is_complete
         True
     """
-    chosen = settings or auditing.AuditSettings()
+    check_arguments(audit, options, AuditArguments)
+    chosen = with_arguments(settings or auditing.AuditSettings(), options)
     auditing.check_settings(chosen)
-    where = domain or auditing.AuditDomain()
+    where = with_arguments(domain or auditing.AuditDomain(), options)
     if not isinstance(model, auditing.Material):
         model = material(model, data=data, target=target)
     elif data is not None or target:
@@ -580,7 +598,7 @@ def audit(
         model,
         domain=auditing.limit_domain(box, where.limits, model.model),
         row=row or None,
-        selection=selection,
+        selection=with_arguments(selection or auditing.AuditSelection(), options),
         settings=chosen,
         report=progress,
         repeat=repeat,
@@ -728,6 +746,7 @@ def diff(
     settings: auditing.AuditSettings | None = None,
     allow_loss: bool = False,
     progress: Progress | None = None,
+    **options: Unpack[DrawArguments],
 ) -> auditing.Difference:
     """Return what has changed from one model to another, and which decisions do.
 
@@ -741,8 +760,10 @@ def diff(
         settings: How many points are drawn from the domain, and their seed.
         allow_loss: As in `load`, for both files.
         progress: Called with what is done and which share of it.
+        options: `rows` and `seed` of the settings by name, which go before these.
 
     Raises:
+        TypeError: If there is no setting of a name.
         ReadError: If a file cannot be read, or the two are about different inputs, or
             one gives numbers and the other decides.
         LossError: As `load`.
@@ -757,6 +778,7 @@ def diff(
         >>> diff(tree, rules_from_tree(tree)).verdict
         'equal'
     """
+    check_arguments(diff, options, DrawArguments)
     if not budget > 0.0:
         raise ValueError(f"the budget must be above 0 million steps, not {budget!r}")
     models, files = zip(
@@ -778,7 +800,9 @@ def diff(
         second,
         domain=auditing.common_domain(first, second, limits or {}, rows),
         rows=rows,
-        settings=settings or auditing.AuditSettings(budget=budget),
+        settings=with_arguments(
+            settings or auditing.AuditSettings(budget=budget), options
+        ),
         budget=auditing.Budget(int(min(budget, 1e9) * 1e6)),
         report=progress or auditing.silent,
         files=(files[0], files[1]),

@@ -34,6 +34,7 @@ from .findings.configuration import read_configuration as read_configuration
 from .findings.configuration import settings_with as settings_with
 from .findings.domains import AuditDomain as AuditDomain
 from .findings.domains import Limits as Limits
+from .findings.domains import Within as Within
 from .findings.domains import domain_of as domain_of
 from .findings.domains import limit_domain as limit_domain
 from .findings.domains import read_value as read_value

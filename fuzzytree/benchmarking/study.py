@@ -79,6 +79,8 @@ class BenchSettings(msgspec.Struct, frozen=True):
     def __post_init__(self) -> None:
         """Refuse what cannot be done, before any work."""
         for name, values in (("rows", self.rows), ("threads", self.threads)):
+            if isinstance(values, int):  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise TypeError(f"{name}: takes several numbers, such as ({values},)")
             if not values:
                 raise ValueError(f"{name}: name at least one number")
             for value in values:

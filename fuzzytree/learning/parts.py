@@ -18,7 +18,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Unpack
 
 import msgspec
 import numpy as np
@@ -28,7 +28,7 @@ from fuzzytree.errors import LearningError, ReadError, TableError
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning.findings import refuse_measurements
 from fuzzytree.learning.learner import ArrayLearner, Learnt, check_rows
-from fuzzytree.learning.settings import LearningSettings
+from fuzzytree.learning.settings import LearningSettings, SettingArguments, settings_of
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.model import DATE_UNIT, FuzzyTree, as_names, with_label_type
 from fuzzytree.tables import (
@@ -133,6 +133,7 @@ class Learner:
         units: The unit of a column, by name.
         name: The name of the tree.
         settings: How to learn.
+        options: Settings by name, such as `leaves=4`, which go before `settings`.
 
     Example:
         >>> import pandas as pd
@@ -155,6 +156,7 @@ class Learner:
         units: Mapping[str, str] | None = None,
         name: str = "tree",
         settings: LearningSettings | None = None,
+        **options: Unpack[SettingArguments],
     ) -> None:
         self.target = target.strip()
         self.columns = None if columns is None else tuple(as_names(columns))
@@ -162,7 +164,8 @@ class Learner:
         self.categorical = frozenset(c.strip() for c in as_names(categorical))
         self.units = dict(units or {})
         self.name = name
-        self.settings = settings or LearningSettings()
+        others = ("columns", "ignore", "categorical", "units", "name")
+        self.settings = settings_of(settings, options, "Learner", others)
         self.unlabelled = self.missing = 0
         self.remarks: tuple[tuple[str, str], ...] = ()
         self._labels = ClassLabels()

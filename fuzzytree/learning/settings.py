@@ -178,15 +178,31 @@ class SettingArguments(TypedDict, total=False):
 
 OTHER_NAMES: Final = {
     "max_depth": "depth",
+    "max_features": "columns_per_node",
     "max_leaf_nodes": "leaves",
     "min_samples_leaf": "min_rows",
     "random_state": "seed",
+    "sample_weight": "weights",
 }
 """What scikit-learn calls a setting, and what it is called here."""
 
+_ABSENT: Final = {
+    "ccp_alpha": "rows that are held out prune the tree; 'leaves' limits its size",
+    "criterion": "each split is scored by the classes of the rows that it separates",
+    "min_impurity_decrease": "rows that are held out prune the tree",
+    "min_samples_split": "'min_rows' is how many rows a leaf holds, at least",
+    "n_estimators": "one tree is learnt, and no forest",
+    "n_jobs": "one tree is learnt, on one processor",
+    "splitter": "each node takes the best split",
+}
+"""Settings of scikit-learn that have none in their place, and why."""
+
 
 def settings_of(
-    settings: LearningSettings | SettingArguments | None, arguments: SettingArguments
+    settings: LearningSettings | SettingArguments | None,
+    arguments: SettingArguments,
+    taker: str = "learn",
+    others: Collection[str] = ("weights", "ignore", "name", "units"),
 ) -> LearningSettings:
     """Return settings, in which those that are named go before the others.
 
@@ -196,8 +212,7 @@ def settings_of(
     if not isinstance(settings, LearningSettings):
         arguments = {**(settings or {}), **arguments}
         settings = LearningSettings()
-    others = ("weights", "ignore", "name", "units")
-    refuse_unknown("learn", arguments, (*LearningSettings.__struct_fields__, *others))
+    refuse_unknown(taker, arguments, (*LearningSettings.__struct_fields__, *others))
     return msgspec.structs.replace(settings, **arguments)
 
 
@@ -205,8 +220,10 @@ def refuse_unknown(taker: str, names: Iterable[str], fields: Collection[str]) ->
     """Raise a TypeError for the first name that is none of the fields."""
     for name in names:
         if name not in fields:
-            close = OTHER_NAMES.get(name)
-            choice = f"it is {close!r} here" if close else name_choice(name, fields)
+            other = OTHER_NAMES.get(name)
+            choice = _ABSENT.get(name) or name_choice(name, fields)
+            if other in fields:
+                choice = f"it is called {other!r} here"
             raise TypeError(f"{taker} has no setting {name!r}; {choice}")
 
 

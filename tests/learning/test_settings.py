@@ -86,10 +86,15 @@ def test_settings_by_name_go_before_a_mapping_or_an_object() -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("max_depth", "it is 'depth' here"),
-        ("max_leaf_nodes", "it is 'leaves' here"),
-        ("min_samples_leaf", "it is 'min_rows' here"),
-        ("random_state", "it is 'seed' here"),
+        ("max_depth", "it is called 'depth' here"),
+        ("max_leaf_nodes", "it is called 'leaves' here"),
+        ("min_samples_leaf", "it is called 'min_rows' here"),
+        ("random_state", "it is called 'seed' here"),
+        ("n_estimators", "one tree is learnt, and no forest"),
+        (
+            "criterion",
+            "each split is scored by the classes of the rows that it separates",
+        ),
         ("leafs", "there is {}, ... (did you mean 'leaves'?)"),
     ],
 )
