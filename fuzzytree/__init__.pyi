@@ -25,7 +25,16 @@ from .auditing import AuditDomain as AuditDomain
 from .auditing import AuditSelection as AuditSelection
 from .auditing import AuditSettings as AuditSettings
 from .benchmarking import BenchSettings as BenchSettings
+from .errors import DisagreementError as DisagreementError
 from .errors import FuzzyTreeError as FuzzyTreeError
+from .errors import InvalidModelError as InvalidModelError
+from .errors import LearningError as LearningError
+from .errors import LossError as LossError
+from .errors import MissingExtraError as MissingExtraError
+from .errors import PortError as PortError
+from .errors import ReadError as ReadError
+from .errors import TableError as TableError
+from .errors import WriteError as WriteError
 from .estimator import FuzzyTreeClassifier as FuzzyTreeClassifier
 from .formats import from_simpful as from_simpful
 from .formats import from_skfuzzy as from_skfuzzy

@@ -21,6 +21,10 @@ class InvalidModelError(FuzzyTreeError, ValueError):
         self.mistakes = tuple(mistakes)
         super().__init__("\n".join(sentence for _, sentence in self.mistakes))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Return how a pickle or a copy makes it again."""
+        return type(self), (self.mistakes,)
+
 
 class LearningError(FuzzyTreeError, ValueError):
     """A table that nothing can be learnt from."""
@@ -30,8 +34,11 @@ class TableError(FuzzyTreeError, ValueError):
     """A table that does not fit: its columns, its types or its width."""
 
 
-class ReadError(FuzzyTreeError, ValueError):
-    """A file that cannot be read; the text says where and what would be right."""
+class ReadError(FuzzyTreeError, OSError, ValueError):
+    """A file that cannot be read; the text says where and what would be right.
+
+    What the operating system said, such as its `errno`, is the `__cause__`.
+    """
 
 
 class WriteError(FuzzyTreeError, OSError):

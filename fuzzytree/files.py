@@ -12,7 +12,7 @@ from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import BinaryIO
 
-from fuzzytree.errors import ReadError, WriteError
+from fuzzytree.errors import FuzzyTreeError, ReadError, WriteError
 
 LIMIT = 256 * 2**20
 """The most bytes that a model file may have by default."""
@@ -145,7 +145,7 @@ def open_atomically(path: PathLike, *, replace: bool = True) -> Generator[Binary
         else:
             with Path(path).open("wb") as device:
                 yield device
-    except WriteError:
+    except FuzzyTreeError:
         raise
     except FileExistsError as error:
         raise WriteError(f"{name}: is there already") from error

@@ -345,6 +345,8 @@ def _read_table(path: PathLike, most: int) -> Recording:
             others.append(values[count:])
     except TableError as error:
         raise ReadError(str(error)) from error
+    except ReadError:
+        raise
     except OSError as error:
         raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
     if not sum(map(len, cells)):
