@@ -9,6 +9,7 @@ from .api import draw as draw
 from .api import draw_reliability as draw_reliability
 from .api import explain as explain
 from .api import export as export
+from .api import export_text as export_text
 from .api import learn as learn
 from .api import load as load
 from .api import material as material

@@ -28,8 +28,10 @@ from fuzzytree.model import (
     FuzzyTree,
     depth,
     label_type_of,
+    leaf_paths,
     with_label_type,
 )
+from fuzzytree.report import Picture, draw_tree
 from fuzzytree.runtimes import baseline, class_probabilities
 from fuzzytree.semantics import Status, rules_from_tree
 from fuzzytree.tables import TableSource, batches, read_table
@@ -391,16 +393,25 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             ValueError: If X does not fit the table of `fit`, or a value is so large
                 that a combination of columns overflows.
         """
-        rules, tree = self.apply(X), self.tree_
+        rules, tree = self._rules(X), self.tree_
         codes = [tree.classes.index(leaf.label) for leaf in tree.leaves]
         return self.classes_[np.array(codes, np.int64)[rules - 1]]
 
     def apply(self, X: npt.ArrayLike) -> IntArray:
-        """Return the number of the leaf of each row: the rule that answers, from 1.
+        """Return the number of the leaf of each row, as scikit-learn's trees do.
+
+        Nodes and leaves are numbered together, depth-first from 0, in the order of
+        `export_text`. The number of the rule that answers, from 1, is in
+        `fuzzytree.run(model, X).rule`.
 
         Raises:
             ValueError: As `predict`.
         """
+        ends = np.array([path[-1] for path in leaf_paths(self.tree_)], np.int64)
+        numbers: IntArray = ends[self._rules(X) - 1]
+        return numbers
+
+    def _rules(self, X: npt.ArrayLike) -> IntArray:
         return self._answers(self._values(X), "tree").rule
 
     def predict_proba(self, X: npt.ArrayLike) -> FloatArray:
@@ -488,9 +499,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         """Return which nodes and which leaf each row passes.
 
         Returns:
-            A sparse indicator of shape (rows, nodes + leaves): first the nodes in the
-            order of `tree_.nodes`, then the leaves; leaf k of `apply` is column
-            `len(tree_.nodes) + k - 1`.
+            A sparse indicator of shape (rows, nodes and leaves), whose columns have
+            the numbers of `apply`.
 
         Raises:
             ValueError: As `predict`.
@@ -502,20 +512,22 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             >>> model.decision_path([[1.0], [8.0]]).toarray().tolist()
             [[1, 1, 0], [1, 0, 1]]
         """
-        leaves = self.apply(X) - 1
-        paths = _paths(self.tree_)
-        nodes, size = len(self.tree_.nodes), len(paths)
+        rules, paths = self._rules(X), leaf_paths(self.tree_)
+        ends = np.cumsum([0, *map(len, paths)])
+        size = len(self.tree_.nodes) + len(paths)
         ways = csr_array(
-            (
-                np.ones(sum(map(len, paths)) + size, np.int64),
-                np.array(
-                    [k for end, path in enumerate(paths) for k in (*path, nodes + end)]
-                ),
-                np.cumsum([0, *(len(path) + 1 for path in paths)]),
-            ),
-            shape=(size, nodes + size),
+            (np.ones(ends[-1], np.int64), np.concatenate(paths), ends),
+            shape=(len(paths), size),
         )
-        return ways[leaves]
+        return ways[rules - 1]
+
+    def plot(self, *, title: str | None = None) -> Picture:
+        """Return a picture, which a notebook shows; `picture.save` writes it.
+
+        Raises:
+            ValueError: If the tree is too large for a picture.
+        """
+        return draw_tree(self.__fuzzytree__(), title=title)
 
     def __fuzzytree__(self) -> FuzzyTree:
         """Return the tree, so that every function of fuzzytree takes the classifier.
@@ -573,20 +585,6 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 f"of columns overflows ({len(overflown)} such rows)"
             )
         return outcome
-
-
-def _paths(tree: FuzzyTree) -> list[tuple[int, ...]]:
-    """Return the positions of the nodes that lead to each leaf, from the root on."""
-    found: list[tuple[int, ...]] = [()] * len(tree.leaves)
-    above: list[tuple[int, ...]] = [()] * len(tree.nodes)
-    for number, node in enumerate(tree.nodes):  # parents stand before children
-        path = (*above[number], number)
-        for branch in node.branches:
-            if branch.node is not None:
-                above[branch.node - 1] = path
-            else:
-                found[(branch.leaf or 1) - 1] = path
-    return found
 
 
 def _prepared(tree: FuzzyTree) -> Callable[[ModelKind], Run]:

@@ -20,15 +20,18 @@ from numpy.testing import assert_allclose
 from sklearn import config_context
 from sklearn.base import clone
 from sklearn.datasets import load_iris, load_wine
+from sklearn.exceptions import NotFittedError
 from sklearn.metrics import accuracy_score, make_scorer
 from sklearn.model_selection import GridSearchCV, cross_val_score, cross_validate
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
+from sklearn.tree import DecisionTreeClassifier
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 import fuzzytree as ft
 from fuzzytree.errors import MissingExtraError
 from fuzzytree.estimator import FuzzyTreeClassifier, Mode
+from fuzzytree.model import leaf_paths
 from fuzzytree.model.rulebase import Band, Part, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -61,7 +64,8 @@ def test_predict_descends_the_tree() -> None:
     rows = WINE.data.to_dict("records")
     answers = [descend(model.tree_, row) for row in rows]
     assert model.predict(WINE.data).tolist() == [int(a.label or -1) for a in answers]
-    assert model.apply(WINE.data).tolist() == [answer.rule for answer in answers]
+    ends = [leaf_paths(model.tree_)[answer.rule - 1][-1] for answer in answers]
+    assert model.apply(WINE.data).tolist() == ends
 
 
 def test_the_probabilities_are_those_of_the_reference() -> None:
@@ -456,17 +460,42 @@ def test_the_decision_function_is_the_logarithm_of_the_probabilities(
 def test_paths_lead_through_nodes_to_the_leaf_that_answers() -> None:
     model = FuzzyTreeClassifier().fit(WINE.data, WINE.target)
     tree, found = model.tree_, model.decision_path(WINE.data)
-    leaves = model.apply(WINE.data)
-    nodes = len(tree.nodes)
+    ends, rules = model.apply(WINE.data), ft.run(tree, WINE.data).rule
+    size = len(tree.nodes) + len(tree.leaves)
     assert found.format == "csr"
-    assert found.shape == (178, nodes + model.get_n_leaves())
+    assert found.shape == (178, size)
     assert model.get_n_leaves() == len(tree.leaves)
     assert set(found.data) == {1}
-    assert (found[np.arange(178), nodes + leaves - 1] == 1).all()
+    assert (found[np.arange(178), ends] == 1).all()
     assert (found[:, [0]].toarray() == 1).all()
     assert found.sum(axis=1).max() - 1 == model.get_depth()
-    support = found[:, nodes:].sum(axis=0)
-    assert support.tolist() == [leaf.support for leaf in tree.leaves]
+    support = dict(zip(ends.tolist(), rules.tolist(), strict=True))
+    for end, rule in support.items():
+        assert found[:, [end]].sum() == tree.leaves[rule - 1].support
+    assert len(support) == len(tree.leaves)
+
+
+@pytest.mark.parametrize("depth", [1, 3, None])
+def test_nodes_have_the_numbers_of_scikit_learn(depth: int | None) -> None:
+    grown = DecisionTreeClassifier(max_depth=depth, random_state=0).fit(IRIS, SPECIES)
+    tree = ft.from_sklearn(grown)
+    paths, rules = leaf_paths(tree), ft.run(tree, IRIS).rule
+    assert grown.apply(IRIS).tolist() == [paths[rule - 1][-1] for rule in rules]
+    passed = grown.decision_path(IRIS).toarray()
+    for row, rule in zip(passed, rules, strict=True):
+        assert np.flatnonzero(row).tolist() == [*paths[rule - 1]]
+    assert len(tree.leaves) == grown.get_n_leaves()
+
+
+def test_a_classifier_draws_and_prints_its_tree() -> None:
+    model = FuzzyTreeClassifier(leaves=3).fit(WINE.data, WINE.target)
+    assert model.plot() == ft.draw(model.tree_)
+    assert ">three classes<" in model.plot(title="three classes").svg
+    text = ft.export_text(model)
+    assert text == ft.export_text(model.tree_)
+    assert text.splitlines()[0].startswith("tree: fuzzy tree, 2 nodes, 3 leaves")
+    with pytest.raises(NotFittedError):
+        FuzzyTreeClassifier().plot()
 
 
 def test_importances_are_those_of_the_columns_that_decide() -> None:

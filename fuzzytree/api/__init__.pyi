@@ -18,6 +18,7 @@ from .verbs import draw as draw
 from .verbs import draw_reliability as draw_reliability
 from .verbs import explain as explain
 from .verbs import export as export
+from .verbs import export_text as export_text
 from .verbs import learn as learn
 from .verbs import learn_table as learn_table
 from .verbs import load as load

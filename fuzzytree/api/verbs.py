@@ -995,6 +995,24 @@ def draw(tree: ModelSource, *, title: str | None = None) -> Picture:
     return report.draw_tree(_tree_of(tree, "draw"), title=title)
 
 
+def export_text(model: ModelSource) -> str:
+    """Return a model as text, as the command `show` prints it.
+
+    Args:
+        model: A tree, a fitted classifier, a rule base or a fuzzy system, or the path
+            of one.
+
+    Raises:
+        ReadError: If the file cannot be read.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> print(export_text(random_tree(1, leaves=2))[:43])
+        random 2: fuzzy tree, 1 node, 2 leaves, dep
+    """
+    return "\n".join(report.model_lines(checking.as_model(model)))
+
+
 def draw_reliability(
     probabilities: FloatArray,
     labels: Sequence[object] | npt.NDArray[np.generic],

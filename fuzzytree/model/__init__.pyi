@@ -168,6 +168,7 @@ from .tree import Use as Use
 from .tree import depth as depth
 from .tree import interval_names as interval_names
 from .tree import intervals as intervals
+from .tree import leaf_paths as leaf_paths
 from .tree import node_mistakes as node_mistakes
 from .tree import outline as outline
 from .tree import root_of as root_of

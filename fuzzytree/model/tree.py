@@ -145,6 +145,29 @@ def root_of(tree: Document) -> Branch:
     return Branch((), node=1) if tree.nodes else Branch((), leaf=1)
 
 
+def leaf_paths(tree: FuzzyTree) -> list[tuple[int, ...]]:
+    """Return the numbers of the nodes that lead to each leaf, its own last.
+
+    Nodes and leaves are numbered together, depth-first from 0.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> leaf_paths(random_tree(1, leaves=2))
+        [(0, 1), (0, 2)]
+    """
+    paths: list[tuple[int, ...]] = [()] * len(tree.leaves)
+    todo: list[tuple[Branch, tuple[int, ...]]] = [(root_of(tree), ())]
+    for number in range(len(tree.nodes) + len(tree.leaves)):
+        branch, above = todo.pop()
+        path = (*above, number)
+        if branch.node is None:
+            paths[(branch.leaf or 1) - 1] = path
+        else:
+            branches = reversed(tree.nodes[branch.node - 1].branches)
+            todo.extend((child, path) for child in branches)
+    return paths
+
+
 def outline(tree: FuzzyTree) -> Iterator[str]:
     """Yield the tree line by line, two spaces a level, branches in interval order."""
     todo = [(0, root_of(tree))]
