@@ -48,6 +48,16 @@ assert fuzzytree.load("model.yaml") == rules
 print(len(tree.leaves), "leaves")
 """
 
+USE_THE_TYPES = """\
+import fuzzytree as ft
+from fuzzytree.exporters import find_format
+
+tree = ft.learn("table.csv", target="y", leaves=4)
+reveal_type(ft.learn)
+reveal_type(find_format)
+ft.learn("table.csv", target="y", leafs=4)
+"""
+
 
 def test_every_package_is_in_the_map() -> None:
     found: set[str] = set()
@@ -113,6 +123,24 @@ def test_an_installation_without_extras_learns_and_names_a_missing_one(
     )
     assert "pip install 'onnx>=1.16' 'onnxruntime>=1.18'" in refused.stderr
     assert "Traceback" not in refused.stderr
+
+
+@pytest.mark.heavy
+def test_pyright_resolves_an_editable_installation(tmp_path: Path) -> None:
+    source = _copy_of_the_project(tmp_path / "source")
+    python = _fresh_environment(tmp_path, "--no-deps", "--editable", str(source))
+    script = tmp_path / "elsewhere" / "script.py"
+    script.parent.mkdir()
+    script.write_text(USE_THE_TYPES, "utf-8")
+    pyright = [sys.executable, "-m", "pyright", "--outputjson", "--pythonpath"]
+    done = _run([*pyright, str(python), str(script)], script.parent, expected=1)
+    found = json.loads(done.stdout)["generalDiagnostics"]
+    messages = [(one["range"]["start"]["line"], one["message"]) for one in found]
+    assert [line for line, _ in messages] == [4, 5, 6]
+    assert messages[0][1].endswith('**options: **SettingArguments) -> FuzzyTree"')
+    assert messages[1][1] == 'Type of "find_format" is "(name: str) -> Format"'
+    assert messages[2][1] == 'No parameter named "leafs"'
+    assert "could not be resolved" not in done.stdout
 
 
 @pytest.mark.heavy
