@@ -72,12 +72,10 @@ def with_arguments(settings: S, arguments: Mapping[str, object]) -> S:
 def check_arguments(
     verb: Callable[..., object], arguments: Mapping[str, object], kind: type
 ) -> None:
-    """Raise a TypeError for an argument that a verb does not have, with the nearest.
+    """Refuse an argument that is neither in its kind nor a keyword of the verb.
 
-    Args:
-        verb: Whose own keywords are arguments, too.
-        arguments: The settings by name.
-        kind: The type of the settings, one of those above.
+    Raises:
+        TypeError: It names the nearest.
     """
     keywords = [
         name

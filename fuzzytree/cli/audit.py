@@ -151,14 +151,7 @@ def command(options: AuditOptions) -> int:
     cannot run, 130 if interrupted.
     """
     from fuzzytree import api
-    from fuzzytree.auditing import (
-        AuditDomain,
-        AuditSelection,
-        baseline_of,
-        obsolete_ids,
-        read_baseline,
-        smt_text,
-    )
+    from fuzzytree.auditing import baseline_of, obsolete_ids, read_baseline, smt_text
     from fuzzytree.report import audit_lines, audit_verdict
 
     if options.target is not None and options.data is None:
@@ -181,20 +174,16 @@ def command(options: AuditOptions) -> int:
         )
         found = api.audit(
             material,
-            domain=AuditDomain(
-                within=options.within,
-                spreads=options.spreads,
-                limits={
-                    **{one.variable: (one.from_, one.to) for one in known.limits},
-                    **limits_of(options.limits),
-                },
-                row=row_of(options.row),
-            ),
-            selection=AuditSelection(
-                select=codes_of(options.select) or known.select,
-                skip=codes_of(options.skip) or known.skip,
-                accepted=accepted,
-            ),
+            within=options.within,
+            spreads=options.spreads,
+            limits={
+                **{one.variable: (one.from_, one.to) for one in known.limits},
+                **limits_of(options.limits),
+            },
+            row=row_of(options.row),
+            select=codes_of(options.select) or known.select,
+            skip=codes_of(options.skip) or known.skip,
+            accepted=accepted,
             settings=settings_of(options.settings, options.budget, known),
             repeat=repeating(click.get_current_context()),
             progress=show,

@@ -99,7 +99,6 @@ def command(options: BenchOptions) -> int:
     than its certified bound, or if --peers adds none that could be measured.
     """
     from fuzzytree import api
-    from fuzzytree.benchmarking import BenchSettings
     from fuzzytree.report import study_lines
 
     output, plots = options.output, options.plots
@@ -114,14 +113,12 @@ def command(options: BenchOptions) -> int:
             data=table_source(options.data, options),
             select=options.select,
             skip=options.skip,
-            settings=BenchSettings(
-                tuple(options.rows),
-                tuple(options.threads),
-                options.error,
-                budget_s=options.budget,
-                seed=options.seed,
-                peers=options.peers,
-            ),
+            rows=tuple(options.rows),
+            threads=tuple(options.threads),
+            most=options.error,
+            budget_s=options.budget,
+            seed=options.seed,
+            peers=options.peers,
             progress=show,
         )
     lines = study_lines(found, is_verbose=options.verbose)

@@ -70,7 +70,6 @@ def command(options: CheckOptions) -> int:
     Python, JavaScript, SQL, PMML) runs only if its text equals a new export.
     """
     from fuzzytree import api, report
-    from fuzzytree.model import CheckSettings
 
     with wrong_options(), progress_bar(quiet=options.quiet) as show:
         found = api.check(
@@ -78,13 +77,11 @@ def command(options: CheckOptions) -> int:
             *options.files,
             data=table_source(options.data, options),
             runtimes=options.runtimes or None,
-            settings=CheckSettings(
-                limit=options.limit,
-                rows_only=options.rows_only,
-                run_code=options.run_code,
-                terms=options.terms,
-                tolerance=options.tolerance,
-            ),
+            limit=options.limit,
+            rows_only=options.rows_only,
+            run_code=options.run_code,
+            terms=options.terms,
+            tolerance=options.tolerance,
             allow_loss=options.allow_loss,
             progress=show,
         )

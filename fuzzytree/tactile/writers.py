@@ -14,12 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.errors import (
-    FuzzyTreeError,
-    MissingExtraError,
-    WriteError,
-    install_hint,
-)
+from fuzzytree.errors import MissingExtraError, ReadError, WriteError, install_hint
 from fuzzytree.files import PathLike, open_atomically, write_atomically
 from fuzzytree.tactile.board_file import board_text
 from fuzzytree.tactile.link.recording import FrameFile, write_recording
@@ -194,7 +189,7 @@ def write_mp4(path: PathLike, file: FrameFile) -> None:
             kept, _seconds = imageio_ffmpeg.count_frames_and_secs(str(part))
             if kept != written:
                 raise RuntimeError(f"{kept} of {written} frames are there")
-        except FuzzyTreeError:
+        except (ReadError, WriteError):
             raise
         except (OSError, RuntimeError) as error:  # their texts are logs of many lines
             raise WriteError(f"{path}: cannot be written: ffmpeg failed") from error
