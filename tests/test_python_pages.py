@@ -16,6 +16,7 @@ NEEDED = {
     "notebook.md": ("pandas",),
     "parts.md": ("pandas",),
     "polars.md": ("polars",),
+    "use-results-in-python.md": ("pandas", "sklearn"),
 }
 
 

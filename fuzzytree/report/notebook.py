@@ -73,12 +73,13 @@ def html_of(result: Result) -> Markup:
 @html_of.register
 def _(rules: RuleBase) -> Markup:
     terms = _printed(term_lines(rules.variables))
-    return part("rule_base", _printed(head_lines(rules)), rules, terms)
+    tables = part("rule_base", _printed(head_lines(rules)), rules, terms)
+    return part("aligned", tables)
 
 
 @html_of.register
 def _(agreement: Agreement) -> Markup:
-    return part("agreement", agreement)
+    return part("aligned", part("agreement", agreement))
 
 
 @html_of.register
@@ -94,9 +95,8 @@ def _(answers: Predictions | Outputs) -> Markup:
     if len(answers) > _MOST_ROWS:
         caption += f"; the first {_MOST_ROWS} rows"
     numbers = range(1, len(columns)) if "class" not in columns else (2,)
-    return part(
-        "table", ("row", *columns), [*islice(rows, _MOST_ROWS)], caption, right=numbers
-    )
+    head, body = ("row", *columns), [*islice(rows, _MOST_ROWS)]
+    return part("aligned", part("table", head, body, caption, right=numbers))
 
 
 def _printed(lines: Iterable[str]) -> Markup:

@@ -83,6 +83,7 @@ def test_a_study_prints_its_lines() -> None:
 
 def test_a_certificate_prints_its_sentence_and_its_origin() -> None:
     certificate = ft.certify(GRIP)
+    assert repr(certificate).startswith("Certificate(float64, rules, delta=")
     assert str(certificate) == f"{certificate.sentence}\n{certificate.origin}"
 
 
@@ -103,6 +104,13 @@ def test_no_name_becomes_markup(value: Any) -> None:
     shown = value._repr_html_()
     assert "<script" not in shown
     assert _words(shown).strip()
+
+
+def test_what_learning_found_is_shown_as_it_prints() -> None:
+    values = np.array([[1.0], [2.0], [7.0], [8.0]])
+    report = ft.FuzzyTreeClassifier().fit(values, [0, 0, 1, 1]).report_
+    assert html.unescape(_words(report._repr_html_())) == str(report)
+    assert str(report).startswith("4 rows, 2 patterns\n2 leaves")
 
 
 def test_no_class_and_no_output_becomes_markup() -> None:
@@ -131,6 +139,8 @@ def test_rules_and_comparisons_are_tables() -> None:
     )
     assert rules._repr_html_().count("<tr>") == 1 + len(rules.rules)
     assert "<table" in found._repr_html_()
+    for shown in (rules._repr_html_(), found._repr_html_()):
+        assert shown.startswith("<style>div.fuzzytree .scrolls table")
 
 
 @pytest.mark.parametrize("rows", [3, 25])
@@ -143,4 +153,4 @@ def test_predictions_are_a_table_of_the_first_rows(rows: int) -> None:
 
 
 def _words(shown: str) -> str:
-    return re.sub(r"<[^>]*>", "", shown)
+    return re.sub(r"<style>.*?</style>|<[^>]*>", "", shown)
