@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import operator
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import (
     TYPE_CHECKING,
@@ -220,7 +221,7 @@ class Predictions(Answers, frozen=True, eq=False):
         """Return the class of a row, or the predictions of some rows."""
         if isinstance(row, slice):
             return self._slice(row)
-        code = self.codes[row]
+        code = self.codes[operator.index(row)]
         return None if code < 0 else label_of(self.choices[code], self.label_type)
 
     def __iter__(self) -> Iterator[Label | None]:
@@ -524,7 +525,7 @@ class Outputs(Answers, frozen=True, eq=False):
                 raise ValueError(f"no output {row!r}; {name_choice(row, self.names)}")
             numbers: FloatArray = self.values[self.names.index(row)]
             return numbers
-        return _row_numbers(self.values[:, row].tolist())
+        return _row_numbers(self.values[:, operator.index(row)].tolist())
 
     def __iter__(self) -> Iterator[float | tuple[float, ...]]:
         """Yield the numbers of each row."""

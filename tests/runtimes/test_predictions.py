@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -180,6 +181,9 @@ def test_predictions_are_a_sequence_of_labels() -> None:
     assert np.asarray(answers[:2]).dtype.kind == "U"
     with pytest.raises(IndexError):
         answers[3]
+    wrong: Any = "class"
+    with pytest.raises(TypeError, match="'str' object cannot be interpreted"):
+        answers[wrong]
     with pytest.raises(ValueError, match="an array of predictions is a copy"):
         np.array(answers, copy=False)
 
