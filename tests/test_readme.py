@@ -21,8 +21,10 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / "README.md"
+LANDING = ROOT / "docs" / "index.md"
 PAGES = [
     README,
+    LANDING,
     *sorted((ROOT / "docs" / "tutorials").glob("*.md")),
     ROOT / "docs" / "how-to" / "require.md",
 ]
@@ -85,6 +87,11 @@ def test_the_wine_table_holds_the_numbers_of_scikit_learn() -> None:
     assert len(head) == 14
     assert [[float(cell) for cell in row[:-1]] for row in rows] == wine.data.tolist()
     assert [grapes.index(row[-1]) for row in rows] == wine.target.tolist()
+
+
+def test_the_landing_page_has_the_ten_lines_of_the_readme() -> None:
+    (ten,) = [text for kind, text in _blocks() if kind == "python"]
+    assert f"```python\n{ten}```" in LANDING.read_text("utf-8")
 
 
 def _blocks() -> list[tuple[str, str]]:
