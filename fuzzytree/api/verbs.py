@@ -56,7 +56,6 @@ from fuzzytree.model import (
     Option,
     Progress,
     RuleBase,
-    Variable,
     Written,
     as_names,
     fingerprint,
@@ -579,13 +578,7 @@ def audit(
         model = material(model, data=data, target=target)
     elif data is not None or target:
         raise ValueError("a material is read already: pass its data to material()")
-    columns = {one.name: one for one in model.model.variables}
-    row: dict[str, float] = {}
-    for name, value in (where.row or {}).items():
-        column = columns.get(name, Variable(name))
-        row[name] = (
-            auditing.read_value(column, value) if isinstance(value, str) else value
-        )
+    row = auditing.row_values(model.model, where.row) if where.row else {}
     box = auditing.domain_of(
         model.model,
         within=where.within,

@@ -37,7 +37,7 @@ from .findings.domains import Limits as Limits
 from .findings.domains import Within as Within
 from .findings.domains import domain_of as domain_of
 from .findings.domains import limit_domain as limit_domain
-from .findings.domains import read_value as read_value
+from .findings.domains import row_values as row_values
 from .findings.locations import ModelFile as ModelFile
 from .findings.locations import model_file as model_file
 from .findings.locations import writable as writable

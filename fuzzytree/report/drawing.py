@@ -35,6 +35,7 @@ _STEPS = 72  # at which a curve is evaluated, beside its corners
 _CORNERS = 160  # of one curve that are drawn exactly
 _KEPT = 1024  # degrees of one curve
 _FLAT = 0.04  # points of a picture below what is visible
+_SQUARE = 256.0  # points of a side, in which a curve is thinned; a power of two
 
 
 class Scale(NamedTuple):
@@ -122,7 +123,7 @@ def axis_of(variable: Variable | SystemOutput) -> Axis:
         term.name: isinstance(term.function, (Linear, Formula))
         for term in variable.terms
     }
-    curves = tuple(_labelled(t) for t in variable.terms if not is_undrawn[t.name])
+    curves = tuple(term_curve(t) for t in variable.terms if not is_undrawn[t.name])
     others = tuple(name for name, is_left in is_undrawn.items() if is_left)
     ends = variable.low, variable.high
     if variable.categories:
@@ -150,7 +151,8 @@ def _corners(curve: SystemCurve) -> tuple[float, ...]:
     return tuple(sorted({one for one in curve.knots() if math.isfinite(one)}))
 
 
-def _labelled(label: Term) -> Curve:
+def term_curve(label: Term) -> Curve:
+    """Return the curve of a term that is neither a sum of inputs nor a formula."""
     curve = label.function
     if isinstance(curve, (Band, LR, Points)) and label.height == 1.0:
         return curve_of(label.name, curve)
@@ -161,14 +163,33 @@ def _labelled(label: Term) -> Curve:
     return Curve(label.name, degree, _corners(curve))
 
 
+def curve_points(curve: Curve, low: float, high: float) -> list[tuple[float, float]]:
+    """Return values and degrees that a curve between two values is drawn through.
+
+    Degrees are exact, and there is a point at each corner and on both sides of each
+    step. Points that lie on a line between others, as far as one sees, are left out.
+
+    Example:
+        >>> curve_points(curve_of("low", Band(high=1.0, right=3.0)), 0.0, 4.0)
+        [(0.0, 1.0), (1.0, 1.0), (3.0, 0.0), (4.0, 0.0)]
+    """
+    values = {between(low, high, k / _STEPS) for k in range(_STEPS + 1)}
+    for corner in curve.corners_between(low, high):
+        values.add(corner)
+        for way in (-math.inf, math.inf):
+            near = min(max(math.nextafter(corner, way), low), high)
+            if abs(curve.degree(near) - curve.degree(corner)) * _SQUARE > _FLAT:
+                values.add(near)  # a step
+    x, dots = Scale(low, high, 0.0, _SQUARE), dict[tuple[float, float], float]()
+    for value in sorted(values):
+        dots.setdefault((x.at(value), _SQUARE * curve.degree(value)), value)
+    return [(dots[dot], dot[1] / _SQUARE) for dot in thinned([*dots])]
+
+
 def polyline(curve: Curve, x: Scale, y: Scale) -> Markup:
     """Return a curve as the path of a picture, with its corners and steps."""
-    corners = curve.corners_between(x.low, x.high)
-    values = {between(x.low, x.high, k / _STEPS) for k in range(_STEPS + 1)}
-    for corner in corners:
-        values |= {corner, math.nextafter(corner, math.inf)}
-    dots = [(x.at(v), y.at(curve.degree(v))) for v in sorted(values)]
-    return path_of(thinned(dots))
+    points = curve_points(curve, x.low, x.high)
+    return path_of([(x.at(value), y.at(degree)) for value, degree in points])
 
 
 def between(low: float, high: float, part: float) -> float:

@@ -12,11 +12,14 @@ from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.states import Span
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import (
+    LR,
     Band,
     Part,
     Points,
     Rule,
     RuleBase,
+    Shape,
+    Side,
     Variable,
 )
 from fuzzytree.numerics.exact import exact_axis, exact_degree
@@ -27,6 +30,7 @@ from fuzzytree.report.drawing import (
     Scale,
     axes_of,
     curve_of,
+    curve_points,
     cut,
     polyline,
     spread,
@@ -123,6 +127,30 @@ def test_names_that_do_not_fit_above_their_curves_are_counted() -> None:
     assert drawn.count('class="curve"') == 24
     assert 0 < named < 24
     assert f"+ {24 - named} unnamed, 6 not drawn" in drawn
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        Band(low=1.0, high=2.0),
+        Band(low=1.0, high=2.0, left=0.5, right=4.0),
+        Points((1.0, 1.5, 3.0), (0.2, 1.0, 0.0)),
+        LR(2.0, Side(0.5, (0.7, -0.1)), Side(1.0, (0.5,))),
+    ],
+    ids=["steps", "ramps", "points", "sets"],
+)
+def test_points_of_a_curve_are_exact_and_near_it_everywhere(shape: Shape) -> None:
+    points = curve_points(curve_of("on", shape), 0.0, 5.0)
+    values, degrees = zip(*points, strict=True)
+    assert [*values] == sorted({*values})
+    assert (values[0], values[-1]) == (0.0, 5.0)
+    for value, degree in points:
+        assert degree == float(exact_degree(shape, Fraction(value)))
+    for value in np.linspace(0.0, 5.0, 331).tolist():
+        near = float(np.interp(value, values, degrees))
+        assert near == pytest.approx(
+            float(exact_degree(shape, Fraction(value))), abs=2e-3
+        )
 
 
 def test_the_thinned_dots_of_a_line_keep_its_corners() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
@@ -24,7 +23,7 @@ from fuzzytree.auditing.findings.codes import (
     audit_answer,
 )
 from fuzzytree.auditing.findings.configuration import check_settings, code_selection
-from fuzzytree.auditing.findings.domains import Words, domain_of
+from fuzzytree.auditing.findings.domains import Words, domain_of, row_values
 from fuzzytree.auditing.findings.locations import (
     ModelFile,
     locations_of,
@@ -51,7 +50,7 @@ from fuzzytree.auditing.findings.subject import (
 )
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters import find_format
-from fuzzytree.model import Document, fingerprint, kind_of, name_choice, version
+from fuzzytree.model import Document, fingerprint, kind_of, version
 from fuzzytree.rechecking import CannotRunError, Report, claims_text, confirm
 
 _BY_CONSTRUCTION = "not asked where true by construction of relative rules"
@@ -87,7 +86,7 @@ def audit(
     check_settings(settings)
     wanted = code_selection(selection.select, selection.skip)
     if row is not None:
-        _check_row(row, model.inputs)
+        row_values(model, row)
     viewed = view(model, domain or domain_of(model))
     reasons: dict[str, str] = {}
     if viewed.rules is not None and viewed.rules.kind == "relative":
@@ -202,21 +201,6 @@ def with_confirmations(
         result.append(answer)
     why = _NO_SOLVER if report.unconfirmed else ""
     return tuple(sorted(result, key=lambda answer: answer.code)), why
-
-
-def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
-    """Refuse a row without a finite value for each input."""
-    for name, value in row.items():
-        if name not in inputs:
-            raise ValueError(
-                f"the row has a value of {name!r}, which is no input; "
-                f"{name_choice(name, inputs)}"
-            )
-        if not math.isfinite(value):
-            raise ValueError(f"the row's {name!r} must be finite, not {value!r}")
-    absent = [name for name in inputs if name not in row]
-    if absent:
-        raise ValueError(f"the row has no value of {', '.join(map(repr, absent))}")
 
 
 def source_of(name: str, content: bytes) -> SourceFile:

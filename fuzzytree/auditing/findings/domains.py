@@ -367,3 +367,40 @@ def read_value(variable: Variable, text: str) -> float:
     if value is None or is_missing or math.isnan(value):
         raise ValueError(f"{variable.name!r} cannot be {text!r}; it is {allowed}")
     return value
+
+
+def row_values(
+    model: Document, row: Mapping[str, float | str], *, is_partial: bool = False
+) -> dict[str, float]:
+    """Return the values of a row by input, from numbers or the words of its table.
+
+    A partial row may lack inputs.
+
+    Raises:
+        ValueError: If a name is no input, a value is not finite or no category, or the
+            row lacks an input.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1, leaves=2)
+        >>> row_values(tree, dict.fromkeys(tree.inputs, "0.5")) == dict.fromkeys(
+        ...     tree.inputs, 0.5
+        ... )
+        True
+    """
+    columns = {one.name: one for one in model.variables if not one.parts}
+    values: dict[str, float] = {}
+    for name, cell in row.items():
+        if name not in columns:
+            raise ValueError(
+                f"the row has a value of {name!r}, which is no input; "
+                f"{name_choice(name, columns)}"
+            )
+        value = read_value(columns[name], cell) if isinstance(cell, str) else cell
+        if not math.isfinite(value):
+            raise ValueError(f"the row's {name!r} must be finite, not {value!r}")
+        values[name] = float(value)
+    absent = [name for name in columns if name not in values]
+    if absent and not is_partial:
+        raise ValueError(f"the row has no value of {', '.join(map(repr, absent))}")
+    return values
