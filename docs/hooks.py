@@ -1,8 +1,8 @@
 """The generated parts of the documentation, for `<!-- generated: NAME -->` in a page.
 
-mkdocs calls `on_page_markdown` for each page. Verbs and options come from click,
-formats and runtimes from their tables, findings from the codes of the audit, and the
-API from the public names of `fuzzytree`.
+mkdocs calls `on_page_markdown` and `on_page_content` for each page. Verbs and options
+come from click, formats and runtimes from their tables, findings from the codes of the
+audit, and the API from the public names of `fuzzytree`.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from html import escape, unescape
 
 import click
 import griffe
@@ -24,6 +25,10 @@ from fuzzytree.report.formats import promise_of
 from fuzzytree.runtimes.table import all_runtimes
 
 MARK = re.compile(r"<!-- generated: (\w+) -->")
+CODE = re.compile(
+    r'<div class="highlight">(?=<pre><span></span><code>(.*?)</code>)', re.DOTALL
+)
+COMMAND = re.compile(r'^<span class="gp">.*?</span>(.*)$', re.MULTILINE)
 
 
 class Examples(griffe.Extension):
@@ -40,6 +45,19 @@ class Examples(griffe.Extension):
 def on_page_markdown(markdown: str, **_: object) -> str:
     """Return a page with its marks replaced by what they name."""
     return MARK.sub(lambda mark: "\n".join(PARTS[mark[1]]()), markdown)
+
+
+def on_page_content(html: str, **_: object) -> str:
+    """Return a page whose sessions are copied without their prompts and output."""
+    return CODE.sub(_with_commands, html)
+
+
+def _with_commands(block: re.Match[str]) -> str:
+    lines = [re.sub("<[^>]*>", "", line) for line in COMMAND.findall(block[1])]
+    if not lines:
+        return block[0]
+    commands = escape(unescape("\n".join(lines)))
+    return f'<div class="highlight" data-copy="{commands}">'
 
 
 def verbs() -> Iterator[str]:

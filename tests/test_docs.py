@@ -11,6 +11,7 @@ import re
 import runpy
 import warnings
 from collections.abc import Callable, Sequence
+from html import unescape
 from pathlib import Path
 
 import click
@@ -150,6 +151,18 @@ def test_the_reading_path_is_for_an_afternoon() -> None:
 def test_a_generated_part_names_everything(part: str, names: list[str]) -> None:
     text = HOOKS["on_page_markdown"](f"<!-- generated: {part} -->")
     assert all(name in text for name in names)
+
+
+def test_a_session_is_copied_without_its_prompts_and_output() -> None:
+    session = (
+        '<div class="highlight"><pre><span></span><code><span class="gp">$ </span>'
+        'run<span class="w"> </span><span class="s1">&#39;a b&#39;</span> &gt; c\n'
+        '<span class="go">$ 3 of 4</span>\n<span class="gp">$ </span>ls</code></pre>'
+    )
+    copied = re.findall('data-copy="([^"]*)"', HOOKS["on_page_content"](session))
+    assert [unescape(text) for text in copied] == ["run 'a b' > c\nls"]
+    output = '<div class="highlight"><pre><span></span><code>3 of 4</code></pre></div>'
+    assert HOOKS["on_page_content"](output) == output
 
 
 ENGINES = ("dask", "duckdb", "ibis", "polars", "spark")
