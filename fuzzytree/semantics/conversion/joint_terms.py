@@ -73,6 +73,7 @@ class JointTerms:
         self.labels = {one.name: [*one.terms] for one in system.variables}
         self.losses: list[Loss] = []
         self._names: dict[Condition, str] = {}
+        self._joins: dict[tuple[type, tuple[Condition, ...]], tuple[Lines, float]] = {}
 
     def by_input(
         self, parts: Iterable[Condition], *, is_or: bool
@@ -141,13 +142,16 @@ class JointTerms:
                 lines, bound = self._lines(part)
                 return numerics.negated(lines), bound
             case And(parts=parts) | Or(parts=parts):
-                result = [self._lines(part) for part in parts]
-                total, bound = result[0]
+                total, bound = self._lines(parts[0])
                 join = self._join(is_or=isinstance(condition, Or))
-                for lines, error in result[1:]:
-                    total, more = join(total, lines)
-                    # Errors of a product add; least and greatest pass one on.
-                    bound = bound + error + more
+                for count, part in enumerate(parts[1:], 2):
+                    key = (type(condition), parts[:count])
+                    if key not in self._joins:  # rules begin with the same conditions
+                        lines, error = self._lines(part)
+                        joint, more = join(total, lines)
+                        # Errors of a product add; least and greatest pass one on.
+                        self._joins[key] = joint, bound + error + more
+                    total, bound = self._joins[key]
                 return total, bound
 
     def _lines_of(self, proposition: Proposition) -> Lines:
