@@ -8,9 +8,11 @@ audit, and the API from the public names of `fuzzytree`.
 from __future__ import annotations
 
 import inspect
+import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from html import escape, unescape
+from pathlib import Path
 
 import click
 import griffe
@@ -137,6 +139,24 @@ def findings() -> Iterator[str]:
         yield f"*What to do.* {one.remedy}\n"
 
 
+def peers() -> Iterator[str]:
+    """Yield how fast a tree is in our runtimes and in those of other tools."""
+    study = json.loads((Path(__file__).parent / "how-to" / "bench.json").read_bytes())
+    rows = []
+    for name, shown in PEERS.items():
+        (point,) = (one for one in study["points"] if one["name"] == f"{name}: tree")
+        times = {
+            sample["rows"]: sample["median_ns"] / sample["rows"]
+            for sample in point["timings"]
+            if sample["threads"] == 1
+        }
+        batch = f"{times[10**6]:.3g} ns" if 10**6 in times else ""
+        changed = f"{point['probes']['flips']} of {point['probes']['rows']}"
+        rows.append((shown, f"{times[1] / 1000:.3g} µs", batch, changed))
+    head = ("", "one row", "a row of a million", "changed at cuts")
+    yield _table(head, sorted(rows, key=lambda row: float(row[1].split()[0])))
+
+
 def _prose(text: str) -> str:
     """Return a help text as Markdown; its unwrapped parts become blocks."""
     parts = []
@@ -156,12 +176,23 @@ def _on_one_line(cell: str) -> str:
     return text if text.startswith("`") else text.replace("|", "\\|")
 
 
+PEERS = {
+    "native": "fuzzytree, in Python",
+    "onnxruntime float64": "fuzzytree's ONNX, in double",
+    "onnxruntime float32": "fuzzytree's ONNX, in float",
+    "scikit-learn": "scikit-learn, `predict`",
+    "skl2onnx": "skl2onnx, in onnxruntime",
+    "treelite": "treelite's interpreter",
+    "m2cgen python": "m2cgen, Python",
+    "m2cgen c": "m2cgen, C",
+}
 PARTS: dict[str, Callable[[], Iterable[str]]] = {
     "verbs": verbs,
     "formats": formats,
     "options": options,
     "runtimes": runtimes,
     "findings": findings,
+    "peers": peers,
     "limits": lambda: (f"- {text}" for text in LIMITS),
     "api": lambda: (f"::: fuzzytree.{x}\n" for x in fuzzytree.__all__ if x[0] != "_"),
 }

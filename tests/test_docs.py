@@ -144,6 +144,7 @@ def test_the_reading_path_is_for_an_afternoon() -> None:
         ("findings", list(CODES)),
         ("formats", [one.name for one in all_formats()]),
         ("runtimes", [one.name for one in all_runtimes()]),
+        ("peers", [*HOOKS["PEERS"].values()]),
         ("verbs", ["fuzzytree learn", "fuzzytree tactile live"]),
         ("api", [name for name in fuzzytree.__all__ if name[0] != "_"]),
     ],
