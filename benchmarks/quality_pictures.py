@@ -10,15 +10,15 @@ from quality_statistics import BINS, cliques, critical_difference
 
 from fuzzytree.report import LETTER, Markup, Picture, mark, picture, tick_words, ticks
 from fuzzytree.report.drawing import Scale, path_of
+from fuzzytree.report.pictures import class_mark
 
 _STYLE = """
-.grid { stroke: #e4e4e4; } .axis { stroke: #595d66; fill: none; }
-.alike { stroke: #595d66; stroke-width: 4; } .lead { stroke: #c8c8c8; }
-.dot { fill: #595d66; } .ours { fill: #c04d00; font-weight: 600; }
-.same { stroke: #aaaaaa; stroke-dasharray: 4 3; }
-.name { font-size: 11px; stroke: #ffffff; stroke-width: 2.5; paint-order: stroke; }
+.alike { stroke: var(--quiet); stroke-width: 4; }
+svg .name.ours { fill: var(--c1); font-weight: 600; }
+.mean { fill: var(--quiet); }
+.mean.ours { fill: var(--c1); }
 """
-_COLOURS = ("#c04d00", "#0072b2", "#00795a", "#8a4fae", "#b08900", "#595d66", "#111111")
+_LINES = (1, 0, 2, 5, 4, 9, 6)  # colours of classes
 _WIDE, _ROW = 760.0, 20.0
 
 
@@ -48,9 +48,11 @@ def ranking(means: Mapping[str, float], tables: int) -> Picture:
     for row, (name, mean) in enumerate(zip(names, ordered, strict=True)):
         y = base + _ROW * (row + 0.5)
         look = _look(name)
-        marks.append(mark("words", x.start - 14, y + 4, name, f"name {look}", "end"))
+        marks.append(
+            mark("words", x.start - 14, y + 4, name, f"name {look}".rstrip(), "end")
+        )
         marks.append(mark("line", x.start - 8, x.at(mean), y, y, "lead"))
-        marks.append(_disc(x.at(mean), y, look or "dot"))
+        marks.append(_disc(x.at(mean), y, look))
         marks.append(mark("words", x.at(mean) + 8, y + 4, f"{mean:.1f}", "small"))
     for column, (first, last) in enumerate(runs):
         at = x.end + 34.0 + 9.0 * column
@@ -102,8 +104,8 @@ def accuracy_against_leaves(
         )
         taken.append((left, right, base))
         marks.append(mark("line", at, left - 1, height, base - 4.0, "lead"))
-        marks.append(mark("words", left, base, name, f"name {_look(name)}"))
-    marks += [_disc(*places[name], _look(name) or "dot") for name in sized]
+        marks.append(mark("words", left, base, name, f"name {_look(name)}".rstrip()))
+    marks += [_disc(*places[name], _look(name)) for name in sized]
     low = max(470.0, max(base for *_, base in taken) + 10.0)
     return picture(marks, _WIDE + 20, low, "accuracy against leaves", _STYLE)
 
@@ -120,22 +122,20 @@ def reliability_lines(
     marks = list(_frame(x, y))
     for value in ticks(0.0, 1.0):
         marks.append(mark("words", x.at(value), 446, f"{value:g}", "small", "middle"))
-    marks.append(mark("line", x.at(0), x.at(1), y.at(0), y.at(1), "same"))
+    marks.append(mark("line", x.at(0), x.at(1), y.at(0), y.at(1), "dashed"))
     marks.append(mark("words", 260, 464, "probability given", "small", "middle"))
-    rules = [_STYLE]
     for row, (name, of_tables) in enumerate(bins.items()):
-        colour = _COLOURS[row % len(_COLOURS)]
-        rules.append(f".l{row} {{ stroke: {colour}; stroke-width: 2; fill: none; }}\n")
+        look = f"line {class_mark(_LINES[row % len(_LINES)])}"
         shares = [np.array(one) / np.sum(one, axis=0)[0] for one in of_tables]
         rows, confidence, hits = np.mean(shares, axis=0).T
         seen = rows > 1.0 / (100 * BINS)
         dots = zip(confidence[seen] / rows[seen], hits[seen] / rows[seen], strict=True)
         ways = [(x.at(given), y.at(right)) for given, right in dots]
-        marks.append(mark("path", path_of(ways), f"l{row}"))
+        marks.append(mark("path", path_of(ways), look))
         high = 44.0 + _ROW * row
-        marks.append(mark("line", 490, 520, high - 4, high - 4, f"l{row}"))
+        marks.append(mark("line", 490, 520, high - 4, high - 4, look))
         marks.append(mark("words", 528, high, name, "name"))
-    return picture(marks, _WIDE, 470, "reliability of probabilities", "".join(rules))
+    return picture(marks, _WIDE, 470, "reliability of probabilities")
 
 
 def _frame(x: Scale, y: Scale) -> Iterator[Markup]:
@@ -149,7 +149,7 @@ def _frame(x: Scale, y: Scale) -> Iterator[Markup]:
 
 def _disc(x: float, y: float, look: str) -> Markup:
     way = f"M{x - 4:.1f} {y:.1f}a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z"
-    return mark("path", way, look)
+    return mark("path", way, f"mean {look}".rstrip())
 
 
 def _look(name: str) -> str:

@@ -34,6 +34,7 @@ LETTER = 0.58
 _STEPS = 72  # at which a curve is evaluated, beside its corners
 _CORNERS = 160  # of one curve that are drawn exactly
 _KEPT = 1024  # degrees of one curve
+_NARROW = "fijlrtI.,:;'|!()[] -"
 _FLAT = 0.04  # points of a picture below what is visible
 _SQUARE = 256.0  # points of a side, in which a curve is thinned; a power of two
 
@@ -280,6 +281,79 @@ def cut(words: str, letters: float) -> str:
     """
     words, most = printable(words), max(int(letters), 2)
     return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
+
+
+def text_width(words: str, size: float) -> float:
+    """Return how wide words are at most in usual fonts, in points.
+
+    Example:
+        >>> text_width("il", 10.0), text_width("WW", 10.0)
+        (8.0, 20.0)
+    """
+    return size * sum(map(_letter_width, words))
+
+
+@lru_cache(maxsize=_KEPT)
+def _letter_width(letter: str) -> float:
+    if letter in _NARROW:
+        return 0.4
+    is_broad = letter in "mwMW%@" or not letter.isascii()
+    return 1.0 if is_broad else 0.64 if letter.islower() or letter.isdigit() else 0.76
+
+
+def lines_within(words: str | Sequence[str], wide: float, size: float) -> list[str]:
+    """Return words in lines that fit a width; a word that is too long is broken.
+
+    Words in a sequence are kept together with the blanks in them.
+
+    Example:
+        >>> lines_within("area of the worst nucleus", 90.0, 12.0)
+        ['area of the', 'worst', 'nucleus']
+    """
+    lines = [""]
+    parts = words.split() if isinstance(words, str) else words
+    for word in map(printable, parts):
+        joined = f"{lines[-1]} {word}".lstrip()
+        if text_width(joined, size) <= wide:
+            lines[-1] = joined
+            continue
+        lines += [""] if lines[-1] else []
+        for letter in word:
+            if lines[-1] and text_width(lines[-1] + letter, size) > wide:
+                lines.append("")
+            lines[-1] += letter
+    return lines if lines != [""] else []
+
+
+def word_lines(
+    x: float, y: float, lines: Sequence[str], look: str, step: float, anchor: str = ""
+) -> Iterator[Markup]:
+    """Yield lines of words below one another, from the base of the first."""
+    for place, line in enumerate(lines):
+        yield mark("words", x, y + step * place, line, look, anchor)
+
+
+def legend(
+    entries: Sequence[tuple[Markup, str]], left: float, top: float, wide: float
+) -> tuple[list[Markup], float]:
+    """Return signs with their names, in rows that fit a width, and how high they are.
+
+    A sign lies right of its origin, and above it: 18 points wide, 9 high.
+    """
+    marks: list[Markup] = []
+    at, base, high = left, top + 11.0, 0.0
+    for sign, name in entries:
+        lines = lines_within(name, wide - 24.0, 11.0)
+        size = 24.0 + max((text_width(line, 11.0) for line in lines), default=0.0)
+        if at > left and at + size > left + wide:
+            at, base = left, base + high
+            high = 0.0
+        words = word_lines(24.0, 0.0, lines, "term", 14.0)
+        marks.append(
+            mark("group", [sign, *words], move=f"translate({at:.1f} {base:.1f})")
+        )
+        at, high = at + size + 16.0, max(high, 14.0 * len(lines) + 4.0)
+    return marks, base + high - top - 11.0
 
 
 def axis_marks(x: Scale, base: float) -> Iterator[Markup]:

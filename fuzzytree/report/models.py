@@ -257,7 +257,7 @@ def term_lines(
         if isinstance(one, Variable) and not (one.terms or one.parts):
             continue
         yield one.name + _span_text(one)
-        for position, line in enumerate(_summands(one.parts)):
+        for position, line in enumerate(summands(one.parts)):
             lead = f"  {line}" if position else f"= {line.replace('+', ' ', 1)}"
             yield f"  {lead}"
         if isinstance(one, SystemOutput):
@@ -290,10 +290,11 @@ def sum_text(parts: Sequence[Part]) -> str:
     """
     more = len(parts) - _MOST_PARTS
     rest = [f"+ {counted(more, 'more input')}"] if more > 0 else []
-    return " ".join([*_summands(parts[:_MOST_PARTS]), *rest]).removeprefix("+ ")
+    return " ".join([*summands(parts[:_MOST_PARTS]), *rest]).removeprefix("+ ")
 
 
-def _summands(parts: Sequence[Part]) -> Iterator[str]:
+def summands(parts: Sequence[Part]) -> Iterator[str]:
+    """Yield each summand of a combination with its sign, the first with `+` too."""
     for part in parts:
         centre = "-" if part.centre >= 0 else "+"
         shifted = f"({part.input} {centre} {number(abs(part.centre))})"

@@ -20,13 +20,13 @@ from fuzzytree.report.audit_states import (
     state_word,
 )
 from fuzzytree.report.markup import Markup, macros, source, template, text_lines
+from fuzzytree.report.pictures import class_mark
 from fuzzytree.report.stability import (
     CRITERION,
     advice,
     criterion_row,
     stability_verdict,
 )
-from fuzzytree.report.svg_tree import class_mark
 from fuzzytree.report.text import (
     CERTIFIED,
     COMPARISON,
@@ -54,7 +54,7 @@ def part(name: str, *values: object, **options: object) -> Markup:
 
 def whole_page(**parts: object) -> str:
     """Return the page with its parts."""
-    page = source("page.html")
+    page = source("page.html").replace("/* pictures */\n", source("pictures.css"))
     return template(page).render(policy=_policy(page), **parts)
 
 

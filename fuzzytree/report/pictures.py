@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence, Set
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.files import PathLike, write_atomically
-from fuzzytree.report.markup import Markup, mark
+from fuzzytree.report.markup import Markup, mark, source
 
 SUFFIXES = (".svg", ".png")
 """What a picture's file name can end in."""
 
 _ZOOM = 2.0  # dots of a PNG for each point of its picture
-_STYLE = """
-text { font: 12px system-ui, sans-serif; fill: #1b1c1e; }
-.small { font-size: 10.5px; fill: #595d66; }
-.strong { font-size: 13px; font-weight: 600; }
-"""  # in a file of its own no page says how a picture looks
+_COLOURS = 10  # of classes; more than ten share them
+_CLASS_COLOUR = re.compile(r"var\(--k(?:, (var\(--\w+\)))?\)")
 
 
 class Picture(NamedTuple):
@@ -82,8 +80,18 @@ def check_suffix(suffix: str) -> None:
         raise MissingExtraError(f"a PNG needs {install_hint('plots')}") from error
 
 
+def class_mark(code: int) -> str:
+    """Return the name of a class's colour in the style of pictures and pages."""
+    return f"k{code % _COLOURS}"
+
+
 def picture(
-    marks: Sequence[Markup], wide: float, high: float, title: str, rules: str
+    marks: Sequence[Markup],
+    wide: float,
+    high: float,
+    title: str,
+    rules: str = "",
+    about: str = "",
 ) -> Picture:
     """Return marks as a picture of its own, of that size in points.
 
@@ -92,8 +100,47 @@ def picture(
         wide: The width, in points.
         high: The height, in points.
         title: What readers of a screen say of it.
-        rules: How the marks look, in CSS, beside words that are small or strong.
+        rules: How the marks look, in CSS, a rule a line, beside `pictures.css`.
+        about: What readers of a screen say next.
     """
-    drawn = [mark("style", Markup(_STYLE + rules)), *marks]
+    content = Markup("").join(marks)
+    content = mark("style", Markup(_style(rules, content))) + content
     space = "http://www.w3.org/2000/svg"
-    return Picture(f"{mark('svg', wide, high, 'picture', title, '', drawn, space)}\n")
+    svg = mark("svg", wide, high, "picture", title, about, [content], space)
+    return Picture(f"{svg}\n")
+
+
+def _style(rules: str, content: str) -> str:
+    """Return the style of marks in light, and what is else in dark.
+
+    Not every reader of SVG knows variables: each is replaced by its colour.
+    """
+    palettes, looks = source("pictures.css").split("/* marks */\n")
+    light, dark = (
+        dict(re.findall(r"(--\w+): (#\w+)", part)) for part in palettes.split("@media")
+    )
+    used = {*" ".join(re.findall(r'class="([^"]*)"', content)).split(), "ground"}
+    lines = [*_lines(looks + rules, used)]
+    at_night = [_with_colours(line, dark) for line in lines if "var(" in line]
+    begin = "@media screen and (prefers-color-scheme: dark) {"
+    return "\n".join(
+        [*(_with_colours(line, light) for line in lines), begin, *at_night, "}"]
+    )
+
+
+def _lines(rules: str, used: Set[str]) -> Iterator[str]:
+    """Yield the rules of some marks, what has a class's colour once for each."""
+    for line in rules.splitlines():
+        selector, _, looks = line.partition(" {")
+        if not used >= {*re.findall(r"\.(\w[\w-]*)", selector)}:
+            continue
+        plain = _CLASS_COLOUR.sub(r"\1", line)
+        yield plain
+        for code in range(_COLOURS if plain != line else 0):
+            if class_mark(code) in used:
+                own = _CLASS_COLOUR.sub(f"var(--c{code})", looks)
+                yield f"{selector}.{class_mark(code)} {{{own}"
+
+
+def _with_colours(line: str, colours: Mapping[str, str]) -> str:
+    return re.sub(r"var\((--\w+)\)", lambda match: colours[match[1]], line)

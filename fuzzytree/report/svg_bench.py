@@ -9,19 +9,18 @@ from typing import Literal, NamedTuple
 
 from fuzzytree.benchmarking import Kind, Point, Question, Study, Timing, error_of
 from fuzzytree.report.bench import sizes, timed_of, unbeaten
-from fuzzytree.report.drawing import LETTER, Scale, path_of
+from fuzzytree.report.drawing import Scale, legend, path_of, text_width
 from fuzzytree.report.markup import Markup, mark
-from fuzzytree.report.pictures import Picture, picture
+from fuzzytree.report.pictures import Picture, class_mark, picture
 from fuzzytree.report.text import UNITS, counted
 
-COLOURS: Mapping[Question, str] = {
-    "tree": "#c04d00",
-    "relative rules": "#0072b2",
-    "raw rules": "#00795a",
-    "rules": "#0072b2",
-    "system": "#0072b2",
-}
-"""Of forms of a model: the colour-blind can distinguish them; letters are readable."""
+_LOOKS: Mapping[Question, str] = {
+    "tree": class_mark(1),
+    "relative rules": class_mark(0),
+    "raw rules": class_mark(2),
+    "rules": class_mark(0),
+    "system": class_mark(0),
+}  # the colour of forms of a model
 
 Measure = Literal["strength", "output", "class"]
 
@@ -45,13 +44,13 @@ _DISTANCES = (9, 16, 24, 34, 48, 64, 82, 104, 130, 160)  # of a name from its ma
 _SIDES = ((1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (-1, 0), (1, 0))
 _ANCHORS = ("middle", "start", "end")  # of a name to the right (1) or left (-1)
 _STYLE = """
-.grid { stroke: #e4e4e4; } .zero { fill: #f4f4f4; }
-.axis { stroke: #595d66; fill: none; }
-.floor { stroke: #555555; stroke-dasharray: 4 3; } .step { fill: none; opacity: .5; }
-.lead { stroke: #bbbbbb; stroke-width: .6; } .axis-name { font-size: 11px; }
-.name { font-size: 11px; stroke: #ffffff; stroke-width: 2.5; paint-order: stroke; }
-.bold { font-weight: 700; } .key { stroke-width: 4; } .grey { stroke: #555555; }
-path.hollow { fill: #ffffff; } path.grey.full { fill: #555555; }
+.form { fill: none; stroke: var(--k, var(--quiet)); }
+.form.full { fill: var(--k, var(--quiet)); }
+.form.hollow { fill: var(--card); }
+.form.key { stroke-width: 4; }
+.form.step { opacity: .5; }
+.lead { stroke-width: .6; }
+.bold { font-weight: 700; }
 """
 
 Box = tuple[float, float, float, float]  # left, top, right, bottom, in points
@@ -89,7 +88,7 @@ class Mark(NamedTuple):
     @property
     def look(self) -> str:
         """The class of its colour in the picture's style."""
-        return _look(self.point.question)
+        return f"form {_LOOKS[self.point.question]}"
 
 
 class Panel(NamedTuple):
@@ -173,16 +172,7 @@ def work_precision(study: Study, *, rows: int, threads: int = 1) -> Picture:
     drawn += _times(panels[-1])
     drawn += _names(panels, [time for _, time in floors])
     drawn += _legend(marks, base + _BELOW - 14.0, has_floors=bool(floors))
-    colours = "".join(
-        f".{_look(question)} {{ stroke: {colour}; }}\n"
-        f"path.{_look(question)}.full, text.{_look(question)} {{ fill: {colour}; }}\n"
-        for question, colour in COLOURS.items()
-    )
-    return picture(drawn, _WIDE, base + _BELOW, title, colours + _STYLE)
-
-
-def _look(question: Question) -> str:
-    return question.replace(" ", "-")
+    return picture(drawn, _WIDE, base + _BELOW, title, _STYLE)
 
 
 def marks_of(study: Study, rows: int, threads: int) -> list[Mark]:
@@ -236,7 +226,7 @@ def _panel(panel: Panel) -> Iterator[Markup]:
     left, top, right, base = panel.frame
     if any(one.error == 0.0 for one in panel.marks):
         line = panel.y.at(panel.low - 0.5)
-        yield mark("rect", left, line, right - left, base - line, "zero")
+        yield mark("rect", left, line, right - left, base - line, "track")
     for k in _powers(panel.x):
         yield mark("line", panel.x.at(k), panel.x.at(k), top, base, "grid")
     for at, word in panel.ticks():
@@ -244,12 +234,12 @@ def _panel(panel: Panel) -> Iterator[Markup]:
         yield mark("words", left - 6, at + 4, word, "small", "end")
     yield mark("rect", left, top, right - left, base - top, "axis")
     said = [
-        mark("words", 0, 14 * k, line, "axis-name", "middle")
+        mark("words", 0, 14 * k, line, "term", "middle")
         for k, line in enumerate(_TITLES[panel.measure][:2])
     ]
     turned = f"translate(14 {(top + base) / 2.0:.1f}) rotate(-90)"
     yield mark("group", said, move=turned)
-    for question in COLOURS:
+    for question in _LOOKS:
         front = sorted(
             (panel.across(one.nanoseconds), panel.height(one.error))
             for one in panel.marks
@@ -258,7 +248,7 @@ def _panel(panel: Panel) -> Iterator[Markup]:
         steps = [(at, high) for (_, high), (at, _) in itertools.pairwise(front)]
         if front:
             stairs = sorted([*front, *steps, (right, front[-1][1])])
-            yield mark("path", path_of(stairs), f"step {_look(question)}")
+            yield mark("path", path_of(stairs), f"form step {_LOOKS[question]}")
     yield from (_marker(one, panel) for one in reversed(panel.marks))
 
 
@@ -294,7 +284,7 @@ def _floors(
     fastest = min((time for _, time in floors), default=0.0)
     for name, time in floors:
         at = panel.across(time)
-        yield mark("line", at, at, panel.y.end, panel.y.start, "floor")
+        yield mark("line", at, at, panel.y.end, panel.y.start, "dashed")
         if has_names:
             is_left = len(floors) > 1 and time == fastest
             move = (
@@ -310,7 +300,7 @@ def _times(panel: Panel) -> Iterator[Markup]:
         word = time_text(10.0**k)
         yield mark("words", panel.x.at(k), base + 16, word, "small", "middle")
     middle = (left + right) / 2.0
-    yield mark("words", middle, base + 32, "time for one row", "axis-name", "middle")
+    yield mark("words", middle, base + 32, "time for one row", "term", "middle")
 
 
 def _powers(x: Scale) -> range:
@@ -321,23 +311,21 @@ def _legend(
     marks: Sequence[Mark], base: float, *, has_floors: bool
 ) -> Iterator[Markup]:
     """Yield what explains colours and markers, in one line."""
-    looks = {one.point.question: f"key {one.look}" for one in marks}
+    looks = {one.point.question: f"{one.look} key" for one in marks}
     kinds = {one.point.kind for one in marks}
     signs: list[tuple[str, Markup]] = []
-    for question in COLOURS:
+    for question in _LOOKS:
         if question in looks:
             signs.append((question, mark("line", 0, 18, -4, -4, looks[question])))
     for kind in _KINDS:
         if kind in kinds:
-            signs.append((kind, marker(kind, 9, -4, "grey", is_full=False)))
-    signs.append(("best trade-off", marker("runtime", 9, -4, "grey", is_full=True)))
+            signs.append((kind, marker(kind, 9, -4, "form", is_full=False)))
+    signs.append(("best trade-off", marker("runtime", 9, -4, "form", is_full=True)))
     if has_floors:
-        signs.append(("floor", mark("line", 0, 18, -4, -4, "floor")))
-    left = _LEFT
-    for name, sign in signs:
-        said = mark("words", 24, 0, name, "axis-name")
-        yield mark("group", [sign, said], move=f"translate({left:.1f} {base:.1f})")
-        left += 42.0 + _width(name)
+        signs.append(("floor", mark("line", 0, 18, -4, -4, "dashed")))
+    yield from legend(
+        [(sign, name) for name, sign in signs], _LEFT, base - 11.0, _WIDE
+    )[0]
 
 
 def _names(panels: Sequence[Panel], floors: Sequence[float]) -> Iterator[Markup]:
@@ -360,7 +348,7 @@ def _names(panels: Sequence[Panel], floors: Sequence[float]) -> Iterator[Markup]
         if not (one.is_front or is_few):
             continue
         name = one.point.name.removesuffix(f": {one.point.question}")
-        spots = [*_spots(across, down, _width(name))]
+        spots = [*_spots(across, down, text_width(name, 11.0))]
         free = (
             spot
             for spot in spots
@@ -371,7 +359,8 @@ def _names(panels: Sequence[Panel], floors: Sequence[float]) -> Iterator[Markup]
         if spot is not None:
             boxes.append(spot.box)
             yield mark("line", across, spot.at, down, spot.base - 4.0, "lead")
-            look = f"name {one.look}{' bold' if one.is_front else ''}"
+            own = _LOOKS[one.point.question]
+            look = f"name {own}{' bold' if one.is_front else ''}"
             yield mark("words", spot.at, spot.base, name, look, spot.anchor)
 
 
@@ -391,10 +380,6 @@ def _spots(across: float, down: float, wide: float) -> Iterator[_Spot]:
         left = at - wide * (0.5, 0.0, 1.0)[right]
         box = left, base - 10.0, left + wide, base + 3.0
         yield _Spot(at, base, _ANCHORS[right], box)
-
-
-def _width(name: str) -> float:
-    return 11.5 * LETTER * len(name)
 
 
 def _holds(frame: Box, box: Box) -> bool:

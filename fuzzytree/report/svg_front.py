@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fuzzytree.report.drawing import Scale, path_of
 from fuzzytree.report.markup import Markup, mark
-from fuzzytree.report.pictures import Picture, picture
+from fuzzytree.report.pictures import Picture, class_mark, picture
 from fuzzytree.report.text import counted
 
 if TYPE_CHECKING:
@@ -17,15 +17,6 @@ if TYPE_CHECKING:
 _WIDE, _HIGH = 460.0, 330.0
 _LEFT, _RIGHT, _TOP, _BASE = 50.0, 350.0, 50.0, 276.0
 _LETTERING = 13.0  # points from one line of words to the next
-_COLOURS = ("#2458b3", "#b3482b", "#4a7a2e", "#5b4a8a")
-_RULES = """
-.axis { fill: none; stroke: #595d66; }
-.majority { fill: none; stroke: #9aa0aa; stroke-dasharray: 4 3; }
-""" + "".join(
-    f".line{k} {{ fill: none; stroke: {colour}; stroke-width: 2; }}\n"
-    f".name{k} {{ fill: {colour}; }}\n"
-    for k, colour in enumerate(_COLOURS)
-)
 
 
 def draw_front(front: Front, *, title: str = "") -> Picture:
@@ -58,11 +49,11 @@ def draw_front(front: Front, *, title: str = "") -> Picture:
         points = [
             (x.at(k), y.at(share)) for k, share in zip(front.leaves, row, strict=True)
         ]
-        marks.append(mark("path", path_of(points), f"line{number}"))
+        marks.append(mark("path", path_of(points), f"line {class_mark(number)}"))
         word = "all columns" if columns is None else counted(columns, "column")
-        look = f"small name{number}"
+        look = f"small {class_mark(number)}"
         marks.append(mark("words", _RIGHT + 8, places[number] + 4, word, look))
-    return picture(marks, _WIDE, _HIGH, f"{heading} {facts}", _RULES)
+    return picture(marks, _WIDE, _HIGH, f"{heading} {facts}")
 
 
 def _apart(places: Sequence[float]) -> dict[int, float]:
@@ -83,7 +74,7 @@ def _apart(places: Sequence[float]) -> dict[int, float]:
 def _axes(front: Front, x: Scale, y: Scale) -> Iterator[Markup]:
     yield mark("rect", _LEFT, _TOP, _RIGHT - _LEFT, _BASE - _TOP, "axis")
     level = y.at(front.majority)
-    yield mark("path", path_of([(_LEFT, level), (_RIGHT, level)]), "majority")
+    yield mark("path", path_of([(_LEFT, level), (_RIGHT, level)]), "dashed")
     yield mark("words", _LEFT + 6, level - 4, "majority class", "small")
     for leaves in front.leaves:
         if leaves % 2 == 0:

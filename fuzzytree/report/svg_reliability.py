@@ -20,13 +20,6 @@ _X = Scale(0.0, 1.0, 46.0, 306.0)
 _Y = Scale(0.0, 1.0, 316.0, 56.0)
 _BAR = 40.0  # high, of the most rows
 _BINS = 10  # parts of equal width of [0, 1]
-_RULES = """
-.axis { fill: none; stroke: #595d66; }
-.even { fill: none; stroke: #9aa0aa; stroke-dasharray: 4 3; }
-.rows { fill: #dfe3ea; }
-.right { fill: none; stroke: #2458b3; stroke-width: 2; }
-.dot { fill: #2458b3; }
-"""
 
 
 def draw_reliability(
@@ -80,10 +73,10 @@ def draw_reliability(
         mark("words", 10, 22, heading, "strong"),
         mark("words", 10, 40, facts, "small"),
         *_frame(rows.tolist()),
-        mark("path", path_of(dots), "right"),
+        mark("path", path_of(dots), "line"),
         *(mark("rect", x - 3, y - 3, 6, 6, "dot") for x, y in dots),
     ]
-    return picture(marks, _WIDE, _HIGH, f"{heading}; {facts}", _RULES)
+    return picture(marks, _WIDE, _HIGH, f"{heading}; {facts}")
 
 
 def _frame(rows: list[int]) -> Iterator[Markup]:
@@ -93,8 +86,8 @@ def _frame(rows: list[int]) -> Iterator[Markup]:
     for place, count in enumerate(rows):
         high = _BAR * count / max(rows)
         left = _X.start + step * place
-        yield mark("rect", left + 1, base - high, step - 2, high, "rows")
-    yield mark("path", path_of([(_X.start, base), (_X.end, top)]), "even")
+        yield mark("rect", left + 1, base - high, step - 2, high, "bin")
+    yield mark("path", path_of([(_X.start, base), (_X.end, top)]), "dashed")
     yield mark("rect", _X.start, top, _X.end - _X.start, base - top, "axis")
     for value, word in ((0.0, "0"), (0.5, "0.5"), (1.0, "1")):
         yield mark("words", _X.at(value), base + 15, word, "small", "middle")

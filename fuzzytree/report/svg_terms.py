@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
@@ -20,13 +19,13 @@ from fuzzytree.report.drawing import (
     axis_of,
     between,
     cut,
+    lines_within,
     polyline,
     spread,
 )
 from fuzzytree.report.markup import Markup, mark
-from fuzzytree.report.models import sum_text
-from fuzzytree.report.pictures import Picture, picture
-from fuzzytree.report.svg_tree import class_mark
+from fuzzytree.report.models import summands
+from fuzzytree.report.pictures import Picture, class_mark, picture
 from fuzzytree.report.text import number
 
 WIDE = 340.0
@@ -45,7 +44,7 @@ _FONT = 11.0
 _ACROSS = 3  # variables beside each other in a picture of their own
 _GAP, _LINE = 12.0, 16.0
 _PANEL = 8.0 + _ROW * _MOST_ROWS + _PLOT + 22.0  # at most, of one variable
-_LETTERS = 58  # of a line of words above it
+_SMALL = 10.5  # the size of small words
 _STYLE = """
 svg .term { font-size: 11px; }
 .curve { fill: none; stroke: #1b1c1e; stroke-width: 1.7; stroke-linejoin: round; }
@@ -141,7 +140,7 @@ def draw_terms(model: Document) -> Picture:
     for axis, variable in zip(map(axis_of, variables), variables, strict=True):
         if not (axis.curves or axis.undrawn):
             continue
-        notes = [axis.title, *_note_texts(variable, axis)]
+        notes = [axis.title, *_note_lines(variable, axis)]
         drawn = terms_picture(axis, None, f"v{len(marks)}")
         words = [
             mark("words", 0.0, _LINE * k, note, "small" if k > 1 else "strong")
@@ -162,15 +161,24 @@ def draw_terms(model: Document) -> Picture:
     return picture(marks, wide, high + _GAP, f"The terms of {model.name}", _STYLE)
 
 
-def _note_texts(variable: Variable | SystemOutput, axis: Axis) -> Iterator[str]:
-    """Yield what a picture of terms does not show, in lines of their own."""
+def _note_lines(variable: Variable | SystemOutput, axis: Axis) -> Iterator[str]:
+    """Yield what a picture of terms does not show."""
     words = [f"{place} is {name}" for place, name in enumerate(variable.categories)]
     texts = [", ".join(words)] if words else []
-    texts += [f"{axis.name} = {sum_text(axis.parts)}"] if axis.parts else []
     if axis.undrawn:
         texts.append(f"not drawn: {', '.join(axis.undrawn)}")
     for text in texts:
-        yield from textwrap.wrap(text, _LETTERS)
+        yield from lines_within(text, WIDE, _SMALL)
+    yield from sum_lines(variable, WIDE, _SMALL)
+
+
+def sum_lines(variable: Variable | SystemOutput, wide: float, size: float) -> list[str]:
+    """Return what a combination is, in lines that fit a width; none of an input."""
+    if not variable.parts:
+        return []
+    first, *others = summands(variable.parts)
+    first = f"{variable.name} = {first.removeprefix('+ ')}"
+    return lines_within([first, *others], wide, size)
 
 
 def _curves(

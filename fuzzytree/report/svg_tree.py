@@ -8,37 +8,31 @@ import msgspec
 
 from fuzzytree.model import Document, Node
 from fuzzytree.report.audit_rows import Counts, Passing
-from fuzzytree.report.drawing import LETTER, cut
+from fuzzytree.report.drawing import legend, lines_within, text_width, word_lines
 from fuzzytree.report.markup import Markup, mark
-from fuzzytree.report.models import sum_text, taken
-from fuzzytree.report.pictures import Picture, picture
-from fuzzytree.report.text import counted, number
+from fuzzytree.report.models import taken
+from fuzzytree.report.pictures import Picture, class_mark, picture
+from fuzzytree.report.svg_terms import sum_lines
+from fuzzytree.report.text import counted
 
 MOST_LEAVES = 200
 """Of a tree that is drawn; the page prints a larger one as an outline."""
 
-_WIDE, _HIGH = 176.0, 52.0  # of a box, in points
-_ACROSS, _DOWN = 60.0, 26.0  # between boxes
-_EDGE = 8.0  # around a picture
-_LINE = 20.0  # of words above or below a tree
+_LEAST_WIDE, _MOST_WIDE = 100.0, 230.0  # of a box, in points; longer words are wrapped
+_ACROSS, _DOWN = 44.0, 11.0  # between boxes
+_EDGE, _INSIDE = 8.0, 10.0  # around a picture, and around the words of a box
+_TITLE, _NOTE = 14.0, 10.5  # sizes of words
+_LINE = 13.0  # of small words
 _LEAST, _MOST = 1.5, 9.0  # points: how thick a branch is
-_PALETTE = (
-    *("#0072b2", "#c04d00", "#00795a", "#a3407f", "#7a6000"),
-    *("#5b4db2", "#b3261e", "#00788a", "#5f6b1f", "#57606a"),
-)  # of classes, in their order; more than ten classes share them
-_STYLE = """
-.box { fill: #ffffff; stroke: #595d66; stroke-width: 1.5; }
-.branch { fill: none; stroke: #c8cacd; }
-.track { fill: #efefeb; }
-"""  # of a picture in a file of its own
+_MOST_CLASSES = 3  # whose rows a leaf names
 
 
 class Box(msgspec.Struct):
     """A node or a leaf, the branch that leads to it, and where it stands.
 
     The code is the number of a leaf's class, None for a node; the rows are those that
-    reach it, and the counts are these by class, where they are known; its middle is in
-    points below the top.
+    reach it, and the counts are these by class, where they are known. `span` is the
+    height that it takes with all below it.
     """
 
     level: int
@@ -48,37 +42,58 @@ class Box(msgspec.Struct):
     code: int | None = None  # of the class of a leaf
     rows: int | None = None
     counts: Counts = ()
-    middle: float = 0.0
+    left: float = 0.0
+    top: float = 0.0
+    wide: float = 0.0
+    span: float = 0.0
     above: Box | None = None
     below: list[Box] = msgspec.field(default_factory=lambda: [])
 
     @property
-    def left(self) -> float:
-        """How far from the left it begins, in points."""
-        return _EDGE + self.level * (_WIDE + _ACROSS)
+    def lines(self) -> tuple[list[str], list[str], list[str]]:
+        """The lines of its title, of the note below, and of the branch above it."""
+        inside = self.wide - 2 * _INSIDE
+        title = lines_within(self.title, inside, _TITLE)
+        note = lines_within(self.note, inside, _NOTE)
+        return title, note, lines_within(self.branch, self.wide, _NOTE)
+
+    @property
+    def high(self) -> float:
+        """How high it is, without the branch above it."""
+        title, note, _ = self.lines
+        bar = _LINE if self.counts else 0.0
+        return 16.0 * len(title) + _LINE * len(note) + bar + 9.0
+
+    @property
+    def middle(self) -> float:
+        """How far its middle is from the top of the picture."""
+        return self.top + self.high / 2.0
 
 
 def tree_picture(tree: Document, rows: Passing | None) -> Markup:
     """Return a tree from left to right.
 
-    With rows, a box holds a bar: the rows that pass, by their class. A branch is the
-    thicker the more rows take it; without rows, the more training rows.
+    With rows, a box holds a bar: the rows that pass, by their class; without them it
+    is that of the training rows, where their classes are known. A branch is the
+    thicker the more rows take it.
     """
-    drawn, wide, high = _laid(boxes_of(tree, rows))
-    desc = (
-        "From left to right: each box tests one variable, each branch takes a part of "
-        "its values, and each rounded box is a class; the same as an outline follows"
-    )
-    return mark("svg", wide, high, "tree", f"The tree {_size_text(tree)}", desc, drawn)
+    drawn, wide, high = _tree_marks(boxes_of(tree, rows))
+    title = f"The tree {_size_text(tree)}"
+    return mark("svg", wide, high, "tree", title, _ABOUT, drawn)
+
+
+_ABOUT = (
+    "From left to right: each box tests one variable, each branch takes a part of "
+    "its values, and each rounded box is a class"
+)
 
 
 def draw_tree(tree: Document, *, title: str | None = None) -> Picture:
     """Draw a tree: the variable of each node, the terms of its branches, the classes.
 
-    A node shows its variable and its cuts. A leaf shows its class, and how many
-    training rows reached it; where that is known of all leaves, a branch is the thicker
-    the more rows took it. Below the tree stand the
-    combinations of variables that nodes test.
+    A box shows how many training rows reached it, and a bar of these by class; where
+    that is known of all leaves, a branch is the thicker the more rows took it. Below
+    the tree stand the combinations of variables that nodes test. All names are whole.
 
     Args:
         tree: At most `MOST_LEAVES` leaves.
@@ -92,29 +107,33 @@ def draw_tree(tree: Document, *, title: str | None = None) -> Picture:
             f"a picture shows at most {MOST_LEAVES} leaves, and {tree.name} has "
             f"{len(tree.leaves)}; learn a smaller tree, or read its rules"
         )
-    drawn, wide, high = _laid(boxes_of(tree, None))
-    said = _size_text(tree) if title is None else title
+    boxes = boxes_of(tree, None)
+    drawn, wide, high = _tree_marks(boxes)
+    title = _size_text(tree) if title is None else title
+    wide = max(wide, min(text_width(title, _TITLE) + 2 * _EDGE, 2 * _MOST_WIDE))
+    inside = wide - 2 * _EDGE
+    heading = lines_within(title, inside, _TITLE)
+    marks = [*word_lines(_EDGE, 20.0, heading, "strong", 17.0)]
+    top = 17.0 * len(heading) + 8.0
+    if boxes[0].counts:
+        signs = [
+            (mark("rect", 0, -9, 18, 9, f"bar {class_mark(code)}"), f"rows of {label}")
+            for code, label in enumerate(tree.classes)
+        ]
+        keys, below = legend(signs, _EDGE, top, inside)
+        marks, top = marks + keys, top + below
+    marks.append(mark("group", drawn, move=f"translate(0 {top:.1f})"))
     used = {node.variable for node in tree.nodes}
     notes = [
-        f"{one.name} = {sum_text(one.parts)}"
-        for one in tree.variables
-        if one.parts and one.name in used
+        line
+        for variable in tree.variables
+        if variable.name in used
+        for line in sum_lines(variable, inside, _NOTE)
     ]
-    wide = max([wide, *(LETTER * 14 * min(len(one), 400) for one in (said, *notes))])
-    colours = "".join(
-        f".box.k{k} {{ stroke: {colour}; }}\n"
-        f".bar.k{k}, .strong.k{k} {{ fill: {colour}; }}\n"
-        for k, colour in enumerate(_PALETTE)
+    marks += word_lines(_EDGE, top + high + _LINE, notes, "small", _LINE)
+    return picture(
+        marks, wide, top + high + _LINE * (len(notes) + 1), title, "", _ABOUT
     )
-    marks = [
-        mark("words", _EDGE, _LINE, said, "strong"),
-        mark("group", drawn, move=f"translate(0 {_LINE:.0f})"),
-        *(
-            mark("words", _EDGE, high + _LINE * (k + 1.5), note, "small")
-            for k, note in enumerate(notes)
-        ),
-    ]
-    return picture(marks, wide, high + _LINE * (len(notes) + 1), said, _STYLE + colours)
 
 
 def _size_text(tree: Document) -> str:
@@ -122,22 +141,17 @@ def _size_text(tree: Document) -> str:
     return f"{tree.name}: {nodes}, {counted(len(tree.leaves), 'leaf', 'leaves')}"
 
 
-def _laid(boxes: Sequence[Box]) -> tuple[list[Markup], float, float]:
+def _tree_marks(boxes: Sequence[Box]) -> tuple[list[Markup], float, float]:
     """Return boxes with their branches, and the width and height of all."""
-    high = placed(boxes)
-    wide = max(box.left for box in boxes) + _WIDE + _EDGE
+    arrange(boxes)
+    wide = max(box.left + box.wide for box in boxes) + _EDGE
     whole = boxes[0].rows or 0
     drawn = [_branch(box, whole) for box in boxes if box.above is not None]
-    return [*drawn, *map(_drawn, boxes)], wide, high
-
-
-def class_mark(code: int) -> str:
-    """Return the name of a class's colour in the page's style."""
-    return f"k{code % len(_PALETTE)}"
+    return [*drawn, *map(_box_marks, boxes)], wide, boxes[0].span + 2 * _EDGE
 
 
 def boxes_of(tree: Document, rows: Passing | None) -> list[Box]:
-    """Return all nodes and leaves, depth first; `placed` puts them in their places."""
+    """Return all nodes and leaves, depth first; `arrange` puts them in their places."""
     codes = {label: code for code, label in enumerate(tree.classes)}
     boxes: list[Box] = []
     todo: list[tuple[int | None, int | None, str, Box | None]]
@@ -147,59 +161,86 @@ def boxes_of(tree: Document, rows: Passing | None) -> list[Box]:
         level = above.level + 1 if above else 0
         if node is not None:
             tested = tree.nodes[node - 1]
-            cuts = ", ".join(map(number, tested.cuts))
-            box = Box(level, f"{tested.variable}?", f"cut at {cuts}", branch)
-            if rows:
-                _count(box, rows.nodes[node - 1])
+            box = Box(level, f"{tested.variable}?", "", branch)
+            box.counts = rows.nodes[node - 1] if rows else ()
             todo += [
-                (one.node, one.leaf, _branch_words(tested, place), box)
-                for place, one in reversed([*enumerate(tested.branches)])
+                (way.node, way.leaf, _branch_words(tested, place), box)
+                for place, way in reversed([*enumerate(tested.branches)])
             ]
         else:
             position = leaf or 1
             end = tree.leaves[position - 1]
-            box = Box(level, end.label, "", branch, codes[end.label])
+            box = Box(level, end.label, f"rule {position}", branch, codes[end.label])
             box.rows = end.support
-            if rows:
-                _count(box, rows.leaves[position - 1])
-            box.note = ", ".join(filter(None, [f"rule {position}", _rows_text(box)]))
+            box.counts = rows.leaves[position - 1] if rows else end.counts
         box.above = above
         if above:
             above.below.append(box)
         boxes.append(box)
     for box in reversed(boxes):  # what is not known of a node its leaves show
+        if not box.counts and box.below and all(below.counts for below in box.below):
+            columns = zip(*(below.counts for below in box.below), strict=True)
+            box.counts = tuple(map(sum, columns))
         reached = [below.rows for below in box.below if below.rows is not None]
-        if box.rows is None and box.below and len(reached) == len(box.below):
+        if box.counts:
+            box.rows = sum(box.counts)
+        elif box.rows is None and box.below and len(reached) == len(box.below):
             box.rows = sum(reached)
+        if box.rows is not None:
+            box.note += f"{', ' if box.note else ''}{counted(box.rows, 'row')}"
+        if box.code is not None:
+            box.note += _classes_text(box.counts, tree.classes)
     return boxes
 
 
-def _count(box: Box, counts: Counts) -> None:
-    box.rows, box.counts = sum(counts), counts
+def _classes_text(counts: Counts, classes: Sequence[str]) -> str:
+    """Return the rows of the largest classes of a leaf, if there are several."""
+    order = sorted(range(len(counts)), key=lambda code: -counts[code])
+    names = [*classes, "no class"]
+    shown = [f"{counts[k]} {names[k]}" for k in order if counts[k]]
+    if len(shown) < 2:
+        return ""
+    rest = sum(counts[k] for k in order[_MOST_CLASSES:])
+    more = [f"{rest} of other classes"] if rest else []
+    return f": {', '.join([*shown[:_MOST_CLASSES], *more])}"
 
 
 def _branch_words(node: Node, place: int) -> str:
     return f"{' or '.join(node.branches[place].terms)}: {taken(node, place, '≤')}"
 
 
-def placed(boxes: Sequence[Box]) -> float:
-    """Put leaves below one another and nodes in their middle; return the height."""
-    down = _EDGE + 14.0
-    for box in boxes:
-        if not box.below:
-            box.middle = down + _HIGH / 2.0
-            down += _HIGH + _DOWN
+def arrange(boxes: Sequence[Box]) -> None:
+    """Put boxes of one level below one another, each beside the middle of what follows.
+
+    A level is as wide as its words, within bounds; in these words are wrapped.
+    """
+    left = _EDGE
+    for level in range(max(box.level for box in boxes) + 1):
+        column = [box for box in boxes if box.level == level]
+        sizes = [_LEAST_WIDE]
+        for box in column:
+            inside = text_width(box.title, _TITLE), text_width(box.note, _NOTE)
+            sizes += [max(inside) + 2 * _INSIDE, text_width(box.branch, _NOTE)]
+        for box in column:
+            box.left, box.wide = left, min(max(sizes), _MOST_WIDE)
+        left += column[0].wide + _ACROSS
     for box in reversed(boxes):
-        if box.below:
-            box.middle = (box.below[0].middle + box.below[-1].middle) / 2.0
-    return down - _DOWN + _EDGE
+        own = _LINE * len(box.lines[2]) + box.high + _DOWN
+        box.span = max(own, sum(below.span for below in box.below))
+    boxes[0].top = _EDGE
+    for box in boxes:  # at first `top` is where what it takes begins
+        start = box.top + (box.span - sum(below.span for below in box.below)) / 2.0
+        for below in box.below:
+            below.top, start = start, start + below.span
+        words = _LINE * len(box.lines[2])
+        box.top += (box.span - words - box.high - _DOWN) / 2.0 + words
 
 
 def _branch(box: Box, whole: int) -> Markup:
     above = box.above
     assert above is not None  # the root has no branch
     share = (box.rows or 0) / whole if whole else 0.0
-    start, end = above.left + _WIDE, box.left
+    start, end = above.left + above.wide, box.left
     bend = (start + end) / 2.0
     way = f"M{start:.1f} {above.middle:.1f}C{bend:.1f} {above.middle:.1f} "
     way += f"{bend:.1f} {box.middle:.1f} {end:.1f} {box.middle:.1f}"
@@ -207,28 +248,24 @@ def _branch(box: Box, whole: int) -> Markup:
     return mark("branch", way, thick)
 
 
-def _drawn(box: Box) -> Markup:
-    left, top = box.left, box.middle - _HIGH / 2.0
-    is_leaf = box.code is not None
-    own = f" {class_mark(box.code or 0)}" if is_leaf else ""
-    rx = 14.0 if is_leaf else 4.0
-    room = (_WIDE - 20.0) / (LETTER * 13.0)
-    rows = "" if is_leaf else _rows_text(box)
+def _box_marks(box: Box) -> Markup:
+    title, note, branch = box.lines
+    left, top, inside = box.left, box.top, box.wide - 2 * _INSIDE
+    own = "" if box.code is None else f" {class_mark(box.code)}"
     counts = ", ".join(map(str, box.counts))
     counts = f"rows by class: {counts}" if counts else ""
-    title = [box.branch, box.title, box.note, rows, counts]
+    about = "; ".join(filter(None, [box.branch, box.title, box.note, counts]))
+    under = top + 16.0 * len(title)
+    base = top - 6.0 - _LINE * (len(branch) - 1)
+    bar_top = under + _LINE * len(note) + 7.0
     marks = [
-        mark("rect", left, top, _WIDE, _HIGH, f"box{own}", rx),
-        mark("words", left + 2, top - 6, cut(box.branch, _WIDE / 6.1), "small"),
-        mark("words", left + 10, top + 18, cut(box.title, room), f"strong{own}"),
-        mark("words", left + 10, top + 33, cut(box.note, _WIDE / 6.4), "small"),
-        *_bar(box.counts, left + 10, top + 40, _WIDE - 20),
+        mark("rect", left, top, box.wide, box.high, f"box{own}", 14.0 if own else 4.0),
+        *word_lines(left + 2, base, branch, "small", _LINE),
+        *word_lines(left + _INSIDE, top + 18.0, title, f"strong{own}", 16.0),
+        *word_lines(left + _INSIDE, under + _LINE + 2.0, note, "small", _LINE),
+        *_bar(box.counts, left + _INSIDE, bar_top, inside),
     ]
-    return mark("group", marks, "; ".join(filter(None, title)))
-
-
-def _rows_text(box: Box) -> str:
-    return "" if box.rows is None else counted(box.rows, "row")
+    return mark("group", marks, about)
 
 
 def _bar(counts: Counts, left: float, top: float, wide: float) -> Iterator[Markup]:

@@ -82,7 +82,8 @@ def test_a_system_has_a_colour_and_the_error_of_its_outputs() -> None:
         point("c", 2e5, error(1e-16, 1e-14), question="system"),
     )
     text = work_precision(fan, rows=1000).svg
-    assert "path.system.full, text.system { fill: #0072b2; }" in text
+    assert ".form.full.k0 { fill: #0072b2; }" in text
+    assert 'class="form k0 full"' in text
     assert "error of an output, as a" in text
     assert "error of a strength" not in text
 
@@ -133,7 +134,7 @@ def test_an_error_of_0_lies_on_a_line_that_says_so() -> None:
 
 
 def test_a_legend_explains_what_there_is() -> None:
-    said = [text for text, *_ in words(small(), "axis-name")][5:]
+    said = [text for text, *_ in words(small(), "term")][5:]
     assert said == [
         "tree",
         "raw rules",
@@ -142,7 +143,7 @@ def test_a_legend_explains_what_there_is() -> None:
         "best trade-off",
         "floor",
     ]
-    bare = [text for text, *_ in words(study(point("a", 1e5, error(0.1))), "axis-name")]
+    bare = [text for text, *_ in words(study(point("a", 1e5, error(0.1))), "term")]
     assert bare[3:] == ["rules", "runtime", "best trade-off"]
 
 
@@ -150,8 +151,8 @@ def test_the_front_is_filled_bold_and_shows_what_was_observed_below_its_bound() 
     bold = {text for text, *_ in words(small(), "bold")}
     assert bold == {"native", "native float32", "onnxruntime"}
     drawn = signs(small())
-    assert drawn["native: raw rules"][-1]["class"] == "raw-rules full"
-    assert drawn["simpful: raw rules"][-1]["class"] == "raw-rules hollow"
+    assert drawn["native: raw rules"][-1]["class"] == "form k2 full"
+    assert drawn["simpful: raw rules"][-1]["class"] == "form k2 hollow"
     _, line, _ = drawn["native float32: raw rules"]
     panel = panels(small())[0]
     ends = [panel.height(3e-5), panel.height(2e-6)]

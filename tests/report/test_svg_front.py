@@ -20,9 +20,9 @@ def ends(*shares: float) -> list[tuple[str, float, float]]:
     looks = {one.get("class", ""): one for one in parts}
     return [
         (
-            looks[f"small name{k}"].text or "",
-            float(looks[f"small name{k}"].get("y", "")) - 4,
-            float(looks[f"line{k}"].get("d", "").split()[-1]),
+            looks[f"small k{k}"].text or "",
+            float(looks[f"small k{k}"].get("y", "")) - 4,
+            float(looks[f"line k{k}"].get("d", "").split()[-1]),
         )
         for k in range(len(shares))
     ]
@@ -54,6 +54,6 @@ def test_names_stand_in_the_order_of_their_lines_and_apart(
 
 def test_a_name_has_the_colour_of_its_line() -> None:
     svg = draw_front(Front((1, None), (2, 3), ((0.5, 0.6),) * 2, 0.4, 9)).svg
-    for k, colour in enumerate(("#2458b3", "#b3482b")):
-        assert f".line{k} {{ fill: none; stroke: {colour};" in svg
-        assert f".name{k} {{ fill: {colour}; }}" in svg
+    for k, colour in enumerate(("#0072b2", "#c04d00")):
+        assert f".line.k{k} {{ fill: none; stroke: {colour};" in svg
+        assert f"svg .small.k{k} {{ font-size: 10.5px; fill: {colour}; }}" in svg

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.model.tree import FuzzyTree, Leaf
@@ -72,17 +73,20 @@ def test_a_node_has_the_rows_of_all_that_is_below_it() -> None:
         assert box.rows == sum(below.rows or 0 for below in box.below)
 
 
-def test_a_tree_drawn_without_rows_shows_no_classes_of_the_rows_of_a_box() -> None:
+def test_a_box_shows_the_training_rows_that_reach_it_by_class() -> None:
     tree = slanted()
     picture = draw_tree(tree).svg
-    assert "rows by class" not in picture
-    assert 'class="bar' not in picture
-    assert "cut at 0; 80 rows" in picture  # of the node, for readers of a screen
+    assert "combination 1?; 80 rows; rows by class: 40, 40" in picture
+    parts = ElementTree.fromstring(picture).iter()
+    bars = [one for one in parts if "bar" in one.get("class", "").split()]
+    assert len(bars) == 2 + 2 + 2  # of the legend, the node and the leaves
+    leaves = tuple(replace(leaf, counts=()) for leaf in tree.leaves)
+    bare = replace(tree, leaves=leaves)
+    assert "rows by class" not in draw_tree(bare).svg
+    assert 'class="bar' not in draw_tree(bare).svg
 
 
 def test_a_tree_without_known_rows_is_drawn_without_them() -> None:
-    from msgspec.structs import replace
-
     tree = learnt(3)
     bare = replace(
         tree,
