@@ -22,6 +22,7 @@ from .api import rules_from_tree as rules_from_tree
 from .api import run as run
 from .api import save as save
 from .api import stability as stability
+from .api import why as why
 from .auditing import AuditDomain as AuditDomain
 from .auditing import AuditSelection as AuditSelection
 from .auditing import AuditSettings as AuditSettings

@@ -38,6 +38,7 @@ FILES: Final[Mapping[str, str]] = MappingProxyType(
         "stability.schema.json": "fuzzytree.checking.stability.results:Stability",
         "system.schema.json": "fuzzytree.formats.yaml.layout:SystemFile",
         "tree.schema.json": "fuzzytree.formats.yaml.layout:TreeFile",
+        "why.schema.json": "fuzzytree.auditing.explanation.records:Explanation",
     }
 )
 """Each file's name and the record that it describes, as MODULE:CLASS."""

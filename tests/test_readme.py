@@ -26,6 +26,7 @@ PAGES = [
     README,
     LANDING,
     *sorted((ROOT / "docs" / "tutorials").glob("*.md")),
+    ROOT / "docs" / "how-to" / "explain-one-decision.md",
     ROOT / "docs" / "how-to" / "require.md",
 ]
 MOST_LINES, MOST_OUTPUT = 200, 11

@@ -1,6 +1,7 @@
 from .answering import opened as opened
 from .answering import prepare_answering as prepare_answering
 from .answering import run as run
+from .decisions import why as why
 from .holdout import Accuracy as Accuracy
 from .holdout import Summary as Summary
 from .holdout import accuracy as accuracy

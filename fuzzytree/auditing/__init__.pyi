@@ -21,6 +21,10 @@ from .diff.records import ComparedModel as ComparedModel
 from .diff.records import Difference as Difference
 from .diff.samples import all_inputs as all_inputs
 from .diff.samples import silent as silent
+from .explanation.records import Explanation as Explanation
+from .explanation.records import Reason as Reason
+from .explanation.records import RowChange as RowChange
+from .explanation.rows import explain_row as explain_row
 from .findings.audit import audit as audit
 from .findings.audit import smt_text as smt_text
 from .findings.audit import source_of as source_of

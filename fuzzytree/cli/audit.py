@@ -15,6 +15,7 @@ from fuzzytree.cli.audit_options import (
     limits_of,
     repeating,
     row_of,
+    row_option,
     settings_of,
     table_of,
 )
@@ -77,10 +78,7 @@ class AuditOptions(TableOptions, FullResultOptions):
         "--limits NAME=LOW:HIGH",
         "Range, or NAME=CATEGORY,..., of a variable in the audit (repeat).",
     )
-    row: str | None = option(
-        "--row NAME=VALUE,...",
-        "Row for which to find the nearest row of another class.",
-    )
+    row: str | None = row_option
     select: tuple[str, ...] = several(
         "--select CODES", "Codes to examine, such as FT1,FT301; all by default."
     )

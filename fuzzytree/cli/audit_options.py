@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ import msgspec
 
 from fuzzytree.cli.console import (
     TableOptions,
+    option,
     say,
     setting,
     standard_input,
@@ -58,8 +60,13 @@ def limits_of(texts: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def row_of(text: str | None) -> dict[str, float | str] | None:
-    """Return a row, its values as they are written.
+row_option = option(
+    "--row NAME=VALUE,...", "Row to explain, with the nearest row of another class."
+)
+
+
+def row_of(text: str | None, words: str = "--row") -> dict[str, float | str] | None:
+    """Return values by name, as they are written, perhaps with commas.
 
     Raises:
         click.UsageError: If it is not NAME=VALUE,...
@@ -67,10 +74,10 @@ def row_of(text: str | None) -> dict[str, float | str] | None:
     if text is None:
         return None
     found: dict[str, float | str] = {}
-    for part in text.split(","):
+    for part in re.split(r",(?=[^,]*=)", text):
         name, _, value = part.rpartition("=")
         if not name.strip():
-            raise click.UsageError(f"--row {text}: must be NAME=VALUE,NAME=VALUE,...")
+            raise click.UsageError(f"{words} {text}: must be NAME=VALUE,NAME=VALUE,...")
         found[name.strip()] = value
     return found
 

@@ -25,8 +25,9 @@ from fuzzytree.files import reason
 from fuzzytree.model import noticed, version, watched
 
 _OWN = (
-    *("learn", "collect", "show", "export", "convert", "run", "check", "audit"),
-    *("require", "diff", "explain", "recheck", "bench", "needs", "stability"),
+    *("learn", "collect", "show", "export", "convert", "run", "why", "check"),
+    *("audit", "require", "diff", "explain", "recheck", "bench", "needs"),
+    "stability",
 )
 VERBS: Mapping[str, str] = MappingProxyType(
     {

@@ -45,3 +45,4 @@ from .text import agreement_verdict as agreement_verdict
 from .text import aligned as aligned
 from .text import counted as counted
 from .text import number as number
+from .why import why_lines as why_lines

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from itertools import islice
 from typing import Any, Final
 
-from fuzzytree.auditing import Audit, Code, Compliance, Difference
+from fuzzytree.auditing import Audit, Code, Compliance, Difference, Explanation
 from fuzzytree.benchmarking import Footprint, Study
 from fuzzytree.checking import Stability
 from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, Result, RuleBase
@@ -26,6 +26,7 @@ from fuzzytree.report.parts import part
 from fuzzytree.report.require import compliance_lines
 from fuzzytree.report.stability import stability_lines
 from fuzzytree.report.text import agreement_lines
+from fuzzytree.report.why import why_lines
 from fuzzytree.runtimes import Outputs, Predictions
 
 _MOST_ROWS = 10  # of predictions in a notebook
@@ -37,6 +38,7 @@ _LINES: Final[dict[type[Any], Callable[[Any], Iterable[str]]]] = {
     Code: explanation_lines,
     Compliance: compliance_lines,
     Difference: diff_lines,
+    Explanation: why_lines,
     Footprint: report_lines,
     FuzzySystem: model_lines,
     FuzzyTree: model_lines,

@@ -100,6 +100,7 @@ from .reference import axis_values as axis_values
 from .reference import degree as degree
 from .reference import descend as descend
 from .reference import evaluate as evaluate
+from .reference import filled_row as filled_row
 from .reference import proposition_degree as proposition_degree
 from .reference import row_probabilities as row_probabilities
 from .samples import all_samples as all_samples

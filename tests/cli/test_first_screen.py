@@ -30,6 +30,7 @@ FIRST_LINES = {
     "convert wine.yaml wine.fll --allow-loss": "wrote wine.fll fll, ",
     "run wine.yaml t.csv -o p.csv": "predicted 178 rows barbera 49, barolo 62,",
     "run wine.yaml t.csv --why -o p.csv": "predicted 178 rows barbera 49, barolo",
+    "why wine.yaml --data t.csv --number 66": "wine: grignolino by rule 3, probab",
     "check wine.yaml": "wine: none of 79 comparisons disagrees (238 ",
     "check wine.yaml bad.yaml": "wine: 2 of 81 comparisons disagree (238 ",
     "audit wine.yaml": "nothing found; 30 questions, ",

@@ -65,6 +65,7 @@ VERBS: Mapping[str, str] = {
     "run -o parquet": "run M rows.csv -o out.parquet",
     "run --why": "run M rows.csv --why --json --strengths rule",
     "run --probabilities": "run M rows.csv --probabilities",
+    "why": "why M --data rows.csv --number 5",
     "check": "check M --data rows.csv --generate 100",
     "audit": "audit M --budget 8 --json -o audit.json --fail-on never",
     "recheck": "recheck audit.json M",
