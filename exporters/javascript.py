@@ -60,7 +60,6 @@ from fuzzytree.semantics import (
     row_probabilities,
 )
 
-_MOST_EXAMPLES = 64
 _FEWEST_EXAMPLES = 8
 _STRENGTHS = 20_000  # of all examples together
 
@@ -72,6 +71,7 @@ def write(
     allow_loss: bool = False,
     module: Literal["es", "script"] = "es",
     probabilities: bool = False,
+    examples: int = 64,
 ) -> Written:
     """Return a model as the text of a JavaScript file, in ASCII.
 
@@ -89,9 +89,11 @@ def write(
             it becomes `fuzzytree[name of the model]`, and for `require`.
         probabilities: Whether `answer` of a rule base also returns `probabilities`, of
             the classes in order; the rule base must have them.
+        examples: The most rows of the self-test; fewer where there are many rules.
 
     Raises:
-        ValueError: If probabilities are wanted that the model does not have.
+        ValueError: If probabilities are wanted that the model does not have, or the
+            number of examples is below 0.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -100,8 +102,10 @@ def write(
     """
     source = source_of(write, model, locals())
     del allow_loss
+    if examples < 0:
+        raise ValueError(f"examples: a number from 0 on, not {examples}")
     rated = rated_rules(model, "javascript") if probabilities else None
-    body = "".join(_body(model, rated))
+    body = "".join(_body(model, rated, examples))
     ending = AS_MODULE if module == "es" else AS_SCRIPT
     ending = filled(ending, doors=", ".join(_doors(model)), name=text_of(model.name))
     if module == "script":
@@ -121,7 +125,7 @@ def _doors(model: Document) -> tuple[str, ...]:
     return ("INPUTS", "CLASSES", "decide", *strengths, "answer", "selfTest")
 
 
-def _body(model: Document, rated: RuleBase | None) -> Iterator[str]:
+def _body(model: Document, rated: RuleBase | None, most: int) -> Iterator[str]:
     yield START
     inputs = (_entry_of(one) for one in model.variables if not one.parts)
     yield from table("INPUTS", inputs)
@@ -154,7 +158,7 @@ def _body(model: Document, rated: RuleBase | None) -> Iterator[str]:
     yield ROWS
     yield "\n/* Inputs, numbers, and how far these may be off: only where functions"
     yield "\n * such as exp have last digits of their own. */"
-    yield from table("EXAMPLES", _examples(model, rated))
+    yield from table("EXAMPLES", _examples(model, rated, most))
     yield TEST
 
 
@@ -185,10 +189,10 @@ def _tree(tree: FuzzyTree) -> Iterator[str]:
     yield HELPERS["below"]
 
 
-def _examples(model: Document, rated: RuleBase | None) -> Iterator[str]:
+def _examples(model: Document, rated: RuleBase | None, most: int) -> Iterator[str]:
     """Yield rows, the answers of the reference, and how far numbers may be off."""
-    most = min(_MOST_EXAMPLES, _STRENGTHS // max(len(model.rules), 1))
-    rows = few_probes(model, max(most, _FEWEST_EXAMPLES))
+    few = max(_STRENGTHS // max(len(model.rules), 1), _FEWEST_EXAMPLES)
+    rows = few_probes(model, min(most, few))
     for values, answer, bounds in examples_of(model, rows):
         expected: list[float] = [*answer.outputs, int(answer.status)]
         if not model.outputs:

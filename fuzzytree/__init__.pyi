@@ -14,6 +14,7 @@ from .api import learn as learn
 from .api import load as load
 from .api import material as material
 from .api import needs as needs
+from .api import page as page
 from .api import predict as predict
 from .api import read as read
 from .api import recheck as recheck

@@ -9,6 +9,7 @@ from .holdout import front as front
 from .holdout import grouped as grouped
 from .holdout import majority as majority
 from .leaf_counts import LeafCounts as LeafCounts
+from .pages import page as page
 from .verbs import audit as audit
 from .verbs import bench as bench
 from .verbs import certify as certify

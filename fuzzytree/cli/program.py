@@ -25,7 +25,7 @@ from fuzzytree.files import reason
 from fuzzytree.model import noticed, version, watched
 
 _OWN = (
-    *("learn", "collect", "show", "export", "convert", "run", "why", "check"),
+    *("learn", "collect", "show", "page", "export", "convert", "run", "why", "check"),
     *("audit", "require", "diff", "explain", "recheck", "bench", "needs"),
     "stability",
 )

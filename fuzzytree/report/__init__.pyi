@@ -45,4 +45,6 @@ from .text import agreement_verdict as agreement_verdict
 from .text import aligned as aligned
 from .text import counted as counted
 from .text import number as number
+from .what_if import Page as Page
+from .what_if import what_if_page as what_if_page
 from .why import why_lines as why_lines

@@ -52,22 +52,28 @@ def part(name: str, *values: object, **options: object) -> Markup:
     return macro(*values, **options)
 
 
-def whole_page(**parts: object) -> str:
-    """Return the page with its parts."""
-    page = source("page.html").replace("/* pictures */\n", source("pictures.css"))
-    return template(page).render(policy=_policy(page), **parts)
+def whole_page(name: str = "page.html", **parts: object) -> str:
+    """Return a page with its parts, and with the policy of what it may do."""
+    text = source(name).replace("/* pictures */\n", source("pictures.css"))
+    page = template(text).render(policy=_POLICY, **parts)
+    return page.replace(_POLICY, _policy(page), 1)  # the head has it, before any name
+
+
+_POLICY = "@policy@"
 
 
 def _policy(page: str) -> str:
-    """Return what the page may do: run its own style and script."""
+    """Return what the page may do: run its own styles and scripts."""
     allowed: list[str] = []
     for kind in ("script", "style"):
-        match = re.search(f"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
-        content = match[1] if match else ""
-        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
-        allowed.append(f"{kind}-src 'sha256-{digest}'")
+        digests = (
+            base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+            for content in re.findall(f"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
+        )
+        hashes = " ".join(f"'sha256-{digest}'" for digest in digests)
+        allowed.append(f"{kind}-src {hashes}")
     others = "base-uri 'none'; form-action 'none'"
-    return Markup(f"default-src 'none'; {'; '.join(allowed)}; {others}")
+    return f"default-src 'none'; {'; '.join(allowed)}; {others}"
 
 
 def title_of(code: str) -> str:

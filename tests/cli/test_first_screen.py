@@ -24,6 +24,7 @@ FIRST_LINES = {
     ),
     "collect t.csv --target cultivar -o t.state": "collected 178 rows 13 columns, 3 ",
     "show wine.yaml": "wine: fuzzy tree, 3 nodes, 4 leaves, depth 2",
+    "page wine.yaml --data t.csv -o wine.html": "wrote wine.html 178 rows, ",
     "export wine.yaml -o wine.c": "wrote wine.c c, ",
     "convert wine.yaml wine.onnx": "wrote wine.onnx onnx, ",
     "convert wine.yaml wine.fcl": "wrote wine.fcl fcl, ",

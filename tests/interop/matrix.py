@@ -61,6 +61,7 @@ READABLE = (".yaml", ".fcl", ".fll", ".fis", ".fml", ".onnx")
 VERBS: Mapping[str, str] = {
     "show": "show M",
     "show --picture": "show M --picture picture.svg",
+    "page": "page M --data rows.csv -o model.html",
     "run": "run M rows.csv",
     "run -o parquet": "run M rows.csv -o out.parquet",
     "run --why": "run M rows.csv --why --json --strengths rule",

@@ -18,8 +18,8 @@ from tests.report.page_audits import EVIL, answers, audit_of, rows_of, rule_base
 
 pytestmark = pytest.mark.heavy
 
-_CONTRAST = 4.5  # of small letters, after the guidelines for accessible pages
-_LARGE = 3.0  # of large letters, and of what is drawn
+CONTRAST = 4.5  # of small letters, after the guidelines for accessible pages
+LARGE = 3.0  # of large letters, and of what is drawn
 
 
 class Seen:
@@ -108,11 +108,11 @@ def test_the_page_scrolls_down_and_never_sideways(
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_all_words_stand_out_from_what_is_behind_them(seen: Seen, theme: str) -> None:
     seen.show(theme)
-    faint = seen.run(_FAINT, _CONTRAST, _LARGE)
+    faint = seen.run(FAINT, CONTRAST, LARGE)
     assert faint == []
 
 
-_FAINT = r"""
+FAINT = r"""
 const [least, large] = arguments;
 const parts = (colour) => {
   const found = colour.match(/[\d.]+/g).map(Number);
