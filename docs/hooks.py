@@ -7,8 +7,10 @@ audit, and the API from the public names of `fuzzytree`.
 
 from __future__ import annotations
 
+import functools
 import inspect
 import json
+import pkgutil
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from html import escape, unescape
@@ -30,6 +32,8 @@ MARK = re.compile(r"<!-- generated: (\w+) -->")
 CODE = re.compile(
     r'<div class="highlight">(?=<pre><span></span><code>(.*?)</code>)', re.DOTALL
 )
+TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
+MOST_ROWS = 40
 COMMAND = re.compile(r'^<span class="gp">.*?</span>(.*)$', re.MULTILINE)
 
 
@@ -50,8 +54,18 @@ def on_page_markdown(markdown: str, **_: object) -> str:
 
 
 def on_page_content(html: str, **_: object) -> str:
-    """Return a page whose sessions are copied without their prompts and output."""
-    return CODE.sub(_with_commands, html)
+    """Return a page with sessions that copy well, and long tables behind a link.
+
+    A session is copied without its prompts and output. Tables of options stay open.
+    """
+    return TABLE.sub(_behind_link, CODE.sub(_with_commands, html))
+
+
+def _behind_link(table: re.Match[str]) -> str:
+    rows = table[0].count("<tr>") - 1
+    if rows <= MOST_ROWS or "<th>option</th>" in table[0]:
+        return table[0]
+    return f"<details><summary>Show {rows} rows</summary>{table[0]}</details>"
 
 
 def _with_commands(block: re.Match[str]) -> str:
@@ -157,6 +171,30 @@ def peers() -> Iterator[str]:
     yield _table(head, sorted(rows, key=lambda row: float(row[1].split()[0])))
 
 
+def api() -> Iterator[str]:
+    """Yield for each group of public names a heading and a table with links."""
+    for name, group in GROUPS.items():
+        page = Path(__file__).parent / "reference" / "api" / f"{name}.md"
+        title = page.read_text("utf-8").partition("\n")[0]
+        yield f"## [{title.removeprefix('# ')}](api/{name}.md)\n"
+        yield _names(group)
+
+
+def _members(group: Sequence[str]) -> Iterator[str]:
+    yield _names(group)
+    yield from (f"::: fuzzytree.{name}\n" for name in group)
+
+
+def _names(group: Sequence[str]) -> str:
+    rows = []
+    for name in group:
+        path = f"fuzzytree.{name}"
+        text = inspect.getdoc(pkgutil.resolve_name(path)) or ""
+        shown = f"ft.{name}" if name.split(".")[0] in fuzzytree.__all__ else name
+        rows.append((f"[`{shown}`][{path}]", text.partition("\n")[0]))
+    return _table(("name", "what"), rows)
+
+
 def _prose(text: str) -> str:
     """Return a help text as Markdown; its unwrapped parts become blocks."""
     parts = []
@@ -176,6 +214,43 @@ def _on_one_line(cell: str) -> str:
     return text if text.startswith("`") else text.replace("|", "\\|")
 
 
+GROUPS = {
+    "learn": (
+        *("learn", "LearningSettings", "FuzzyTreeClassifier", "Learner", "LeafCounts"),
+        *("table", "TableFormat"),
+    ),
+    "models": (
+        *("load", "read", "save", "convert", "rules_from_tree", "from_sklearn"),
+        *("from_skfuzzy", "from_simpful", "ModelPath"),
+        *("FuzzyTree", "RuleBase", "FuzzySystem"),
+    ),
+    "run": ("run", "predict", "why", "Predictions", "Outputs"),
+    "export": (
+        *("export", "export_text", "draw", "draw_reliability", "page", "needs"),
+    ),
+    "check": (
+        *("check", "CheckSettings", "certify", "stability", "require"),
+        *("bench", "BenchSettings"),
+    ),
+    "audit": (
+        *("audit", "AuditSettings", "AuditSelection", "AuditDomain", "material"),
+        *("diff", "recheck", "explain"),
+    ),
+    "results": (
+        *("Agreement", "auditing.Audit", "auditing.Code", "auditing.Compliance"),
+        *("auditing.Difference", "auditing.Explanation"),
+        *("benchmarking.Footprint", "benchmarking.Study"),
+        *("checking.Conversion", "checking.Stability", "learning.Front"),
+        *("learning.LearningReport", "model.Reading", "model.Written"),
+        *("numerics.Certificate", "rechecking.Report", "report.Picture"),
+    ),
+    "tactile": ("tactile", "tactile.open", "tactile.features_of", "tactile.names_of"),
+    "errors": (
+        *("FuzzyTreeError", "ReadError", "WriteError", "TableError", "LearningError"),
+        *("InvalidModelError", "LossError", "DisagreementError", "MissingExtraError"),
+        "PortError",
+    ),
+}
 PEERS = {
     "native": "fuzzytree, in Python",
     "onnxruntime float64": "fuzzytree's ONNX, in double",
@@ -194,5 +269,7 @@ PARTS: dict[str, Callable[[], Iterable[str]]] = {
     "findings": findings,
     "peers": peers,
     "limits": lambda: (f"- {text}" for text in LIMITS),
-    "api": lambda: (f"::: fuzzytree.{x}\n" for x in fuzzytree.__all__ if x[0] != "_"),
+    "api": api,
 }
+for _name, _group in GROUPS.items():
+    PARTS[f"api_{_name}"] = functools.partial(_members, _group)

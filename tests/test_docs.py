@@ -10,7 +10,7 @@ import importlib
 import re
 import runpy
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from html import unescape
 from pathlib import Path
 
@@ -21,6 +21,7 @@ import fuzzytree
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.cli.program import program
 from fuzzytree.exporters.table import all_formats
+from fuzzytree.model import Result
 from fuzzytree.runtimes.table import all_runtimes
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -147,11 +148,29 @@ def test_the_reading_path_is_for_an_afternoon() -> None:
         ("peers", [*HOOKS["PEERS"].values()]),
         ("verbs", ["fuzzytree learn", "fuzzytree tactile live"]),
         ("api", [name for name in fuzzytree.__all__ if name[0] != "_"]),
+        ("api_learn", ["::: fuzzytree.learn\n", "::: fuzzytree.Learner\n"]),
     ],
 )
 def test_a_generated_part_names_everything(part: str, names: list[str]) -> None:
     text = HOOKS["on_page_markdown"](f"<!-- generated: {part} -->")
     assert all(name in text for name in names)
+
+
+def test_every_public_name_and_result_has_one_page() -> None:
+    names = [name for group in HOOKS["GROUPS"].values() for name in group]
+    public = {name for name in fuzzytree.__all__ if name[0] != "_"}
+    assert public - {*names} == set(), "add it to a group in docs/hooks.py"
+    assert len(names) == len(set(names))
+    results = {kind.__name__ for kind in _kinds_below(Result)}
+    assert results <= {name.split(".")[-1] for name in names} | {"AnyModel", "Answers"}
+
+
+def _kinds_below(kind: type) -> Iterator[type]:
+    below: type
+    for below in kind.__subclasses__():
+        if below.__module__.startswith("fuzzytree."):
+            yield below
+            yield from _kinds_below(below)
 
 
 def test_a_session_is_copied_without_its_prompts_and_output() -> None:
@@ -164,6 +183,15 @@ def test_a_session_is_copied_without_its_prompts_and_output() -> None:
     assert [unescape(text) for text in copied] == ["run 'a b' > c\nls"]
     output = '<div class="highlight"><pre><span></span><code>3 of 4</code></pre></div>'
     assert HOOKS["on_page_content"](output) == output
+
+
+def test_a_long_table_stands_behind_a_link() -> None:
+    row = "<tr><td>a</td></tr>"
+    long = f"<table><tr><th>file</th></tr>{41 * row}</table>"
+    folded = HOOKS["on_page_content"](f"{long}<p>b</p>{long[:60]}</table>")
+    assert folded.count("<details><summary>Show 41 rows</summary><table>") == 1
+    options = long.replace("file", "option")
+    assert HOOKS["on_page_content"](options) == options
 
 
 ENGINES = ("dask", "duckdb", "ibis", "polars", "spark")
