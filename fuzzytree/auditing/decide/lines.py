@@ -356,35 +356,25 @@ def value_at(lines: Lines, x: Fraction) -> Fraction:
 
 
 def refine(lines: Lines, xs: Sequence[Fraction]) -> Lines:
-    """Return lines on more knots."""
+    """Return lines on more knots, none of them before the first or behind the last."""
     if len(xs) == len(lines.x) and lines.x == tuple(xs):
         return lines
-    at: list[Fraction] = []
-    after: list[Fraction] = []
-    before: list[Fraction] = []
     piece, last = 0, len(lines.x) - 1
-    for n, x in enumerate(xs):
+    if not last:
+        more = lines.at * (len(xs) - 1)
+        return Lines(tuple(xs), lines.at * len(xs), more, more)
+    columns: list[tuple[Fraction, Fraction, Fraction]] = []  # value, limits at a knot
+    for x in xs:
         while piece < last and lines.x[piece + 1] <= x:
             piece += 1
-        if x == lines.x[piece] or last == 0:
-            at.append(lines.at[piece])
+        if x == lines.x[piece]:
+            ends = lines.after[min(piece, last - 1)], lines.before[max(piece - 1, 0)]
+            columns.append((lines.at[piece], *ends))
         else:
-            at.append(_on_piece(lines, piece, x))
-        if n + 1 < len(xs):
-            if last == 0:
-                after.append(lines.at[0])
-                before.append(lines.at[0])
-            else:
-                place = min(piece, last - 1)
-                after.append(_on_piece(lines, place, x))
-                before.append(_on_piece(lines, place, xs[n + 1]))
-    return Lines(tuple(xs), tuple(at), tuple(after), tuple(before))
-
-
-def _on_piece(lines: Lines, piece: int, x: Fraction) -> Fraction:
-    p, q = lines.ends(piece)
-    a, b = lines.x[piece], lines.x[piece + 1]
-    return p if x == a else q if x == b else _on(a, b, p, q, x)
+            a, b = lines.x[piece : piece + 2]
+            columns.append((_on(a, b, *lines.ends(piece), x),) * 3)
+    at, after, before = zip(*columns, strict=True)
+    return Lines(tuple(xs), at, after[:-1], before[1:])
 
 
 def _limit(
