@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from fuzzytree.auditing import Explanation, Reason, RowChange
 from fuzzytree.model import printable
@@ -14,29 +14,38 @@ _MOST_REASONS = 5  # lines of the winning rule
 _MOST_MOVES = 8
 _MOST_RULES = 6  # that fire
 _MOST_OUTPUTS = 4
-_MOST_NAMES = 4  # inputs of a combination, and missing ones
+_MOST_NAMES = 4  # in a list
+_STATUS = {
+    "missing": ", as a value is missing",
+    "uncovered": ", as no rule fires",
+    "tie": ", the first of equally strong rules,",
+}
 
 
-def why_lines(explanation: Explanation) -> Iterator[str]:
+def why_lines(of: Explanation) -> Iterator[str]:
     """Yield an explanation, line by line.
 
     Example:
-        >>> from fuzzytree.auditing import explain_row
+        >>> import fuzzytree
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1, leaves=2)
-        >>> lines = [*why_lines(explain_row(tree, dict.fromkeys(tree.inputs, 0.5)))]
+        >>> lines = [*why_lines(fuzzytree.why(tree, dict.fromkeys(tree.inputs, 0.5)))]
         >>> [line.split()[0] for line in lines if line[0] != " "]
         ['random', 'because', 'runner-up', 'change', 'seen']
     """
-    yield printable(_headline(explanation))
+    yield printable(_headline(of))
+    filled = [f"{text} for a missing {name}" for name, text in of.filled.items()]
+    counts = sorted(of.counts.items(), key=lambda pair: -pair[1])
+    rows = ", ".join(f"{name} {count}" for name, count in counts if count)
+    total = counted(sum(of.counts.values()), "training row")
     sections = {
-        "because": _reasons(explanation),
-        "runner-up": _runner_up(explanation),
-        "change": _changes(explanation),
-        "fires": _fired(explanation),
-        "slope": _slopes(explanation),
-        "filled in": _filled(explanation),
-        "seen": _seen(explanation),
+        "because": [*_reasons(of)],
+        "runner-up": [*_runner_up(of)],
+        "change": [*_changes(of)],
+        "fires": [*_fired(of)],
+        "slope": [*_slopes(of)],
+        "filled in": [some(filled, _MOST_NAMES)] if filled else [],
+        "seen": [f"{total} in this rule: {rows}"] if rows else [],
     }
     for title, lines in sections.items():
         for text in lines:
@@ -44,74 +53,55 @@ def why_lines(explanation: Explanation) -> Iterator[str]:
             title = ""
 
 
-def _headline(explanation: Explanation) -> str:
-    if explanation.outputs:
-        ends = [
-            f"{share.output} {number(share.value)}" for share in explanation.outputs
-        ]
-        return f"{explanation.model}: {', '.join(ends)}{_status(explanation)}"
-    label = "no class" if explanation.label is None else explanation.label
-    text = f"{explanation.model}: {label}{_status(explanation)}"
-    numbers = [
-        _short(one.strength) if one.probability is None else f"{one.probability:.3f}"
-        for one in explanation.classes
-    ]
-    if explanation.rule:
-        first = explanation.classes[0]
-        what = "strength" if first.probability is None else "probability"
-        text += f" by rule {explanation.rule}, {what} {numbers[0]}"
-        pairs = zip(explanation.classes[1:], numbers[1:], strict=True)
-        others = [f"{one.label} {value}" for one, value in pairs]
-        text += f"; {some(others, _MOST_NAMES)}" if others else ""
-    return text
+def _headline(of: Explanation) -> str:
+    ends = [f"{name} {number(value)}" for name, value in of.outputs.items()]
+    label = ", ".join(ends) or of.label or "no class"
+    text = f"{of.model}: {label}{_STATUS.get(of.status, '')}"
+    if not of.rule or of.label is None:
+        return text
+    what, numbers = "strength", {k: _short(x) for k, x in of.strengths.items()}
+    order = of.probabilities or of.strengths
+    if of.probabilities:
+        what, numbers = "probability", {k: f"{x:.3f}" for k, x in order.items()}
+    others = sorted({*order} - {of.label}, key=lambda name: (-order[name], name))
+    text += f" by rule {of.rule}, {what} {numbers[of.label]}"
+    rest = some([f"{name} {numbers[name]}" for name in others], _MOST_NAMES)
+    return f"{text}; {rest}" if rest else text
 
 
-def _status(explanation: Explanation) -> str:
-    texts = {
-        "missing": ", as a value is missing",
-        "uncovered": ", as no rule fires",
-        "tie": ", the first of equally strong rules,",
-    }
-    return texts.get(explanation.status, "")
-
-
-def _reasons(explanation: Explanation) -> list[str]:
-    """Return lines of the winning rule, each proposition before what it consists of."""
-    lines: list[str] = []
-    for shown, reason in enumerate(explanation.because):
+def _reasons(of: Explanation) -> Iterator[str]:
+    """Yield the propositions of the winning rule, each with what it consists of."""
+    room = _MOST_REASONS
+    for position, reason in enumerate(of.because):
+        rest = len(of.because) - position
+        room -= 2 if reason.parts else 1
+        if room < (rest > 1):
+            yield f"and {counted(rest, 'more proposition')}"
+            return
         degree = f" (degree {_short(reason.degree)})" if reason.degree < 1.0 else ""
-        more = [_reason(reason) + degree]
+        yield _reason(reason) + degree
         if reason.parts:
             adds = [
-                f"{part.input} {part.text} adds {part.amount:+.3g}"
-                for part in reason.parts
+                f"{name} {of.row[name]} adds {amount:+.3g}"
+                for name, amount in reason.parts.items()
             ]
-            more.append(f"= {_fitting(adds)}")
-        rest = len(explanation.because) - shown
-        if len(lines) + len(more) + (rest > 1) > _MOST_REASONS:
-            return [*lines, f"and {counted(rest, 'more proposition')}"]
-        lines += more
-    return lines
-
-
-def _fitting(texts: Sequence[str]) -> str:
-    """Return as many texts as fit a line, and how many more there are."""
-    most = len(texts)
-    while most > 1 and len(some(texts, most)) > _WIDTH - _LEAD - 2:
-        most -= 1
-    return some(texts, most)
+            most = len(adds)
+            while most > 1 and len(some(adds, most)) > _WIDTH - _LEAD - 2:
+                most -= 1
+            yield f"= {some(adds, most)}"
 
 
 def _reason(reason: Reason) -> str:
-    value = _short(reason.value) if reason.parts else reason.text
+    value, cut = reason.text, reason.cut_text
+    if reason.parts:
+        value, cut = _short(reason.value), _short(reason.cut or 0.0)
     text = f"{reason.proposition}: {value}"
-    if reason.distance is not None:
-        side = "above" if reason.distance > 0.0 else "below"
-        distance = f"{_short(abs(reason.distance))} {reason.unit}".rstrip()
-        distance = f"{distance} {side}" if reason.distance else "at"
-        cut = _short(reason.cut or 0.0) if reason.parts else reason.cut_text
-        text += f", {distance} its cut {cut}"
-    return text
+    if reason.cut is None:
+        return text
+    distance = reason.value - reason.cut
+    side = "above" if distance > 0.0 else "below"
+    size = f"{_short(abs(distance))} {reason.unit}".rstrip()
+    return f"{text}, {f'{size} {side}' if distance else 'at'} its cut {cut}"
 
 
 def _short(value: float) -> str:
@@ -120,91 +110,58 @@ def _short(value: float) -> str:
     return "<1" if text == "1" and value < 1.0 else text
 
 
-def _runner_up(explanation: Explanation) -> list[str]:
-    rule = explanation.runner_up
-    if rule is None:
-        return []
-    text = f"rule {rule.rule} for {rule.label}, strength {_short(rule.strength)}"
-    return [text + f", kept back by {_reason(rule.reason)}" if rule.reason else text]
+def _runner_up(of: Explanation) -> Iterator[str]:
+    rule = of.runner_up
+    if rule is not None:
+        strength = _short(of.strengths[rule.label])
+        back = f", kept back by {_reason(rule.reason)}" if rule.reason else ""
+        yield f"rule {rule.rule} for {rule.label}, strength {strength}{back}"
 
 
-def _changes(explanation: Explanation) -> list[str]:
-    change, alone = explanation.change, explanation.alone
-    if explanation.outputs:
-        return []
+def _changes(of: Explanation) -> Iterator[str]:
+    change, alone = of.change, of.alone
+    goal = "another class" if of.wanted is None else of.wanted
     if change is None:
-        return [f"none is needed: the class is {explanation.wanted} already"]
-    goal = "another class" if explanation.wanted is None else explanation.wanted
-    if change.verdict == "NONE":
-        return [f"no change that is allowed gives {goal}: proved on the whole domain"]
-    if change.cost is None:
-        return [f"none to {goal} is known: {change.why}"]
-    lines = [f"{_moves(change, explanation)}; {_proof(change, explanation)}"]
-    if alone is not None and alone.moves:
-        lines.append(f"or alone {_moves(alone, explanation)}")
-    elif alone is not None:
-        lines.append(f"no input alone gives {goal}: proved")
-    return lines
+        if not of.outputs:
+            yield f"none is needed: the class is {goal} already"
+    elif change.verdict == "NONE":
+        yield f"no change that is allowed gives {goal}: proved on the whole domain"
+    elif change.verdict == "OPEN":
+        yield f"none to {goal} is known: {change.why}"
+    else:
+        proof = "proved smallest"
+        if change.verdict == "BOUNDED":
+            proof = f"no change below {_cost(change.low, of)} does it; {change.why}"
+        yield f"{_moves(change, of)}; {proof}"
+    if alone is not None:
+        proof = f"no input alone gives {goal}: proved"
+        yield f"or alone {_moves(alone, of)}" if alone.moves else proof
 
 
-def _moves(change: RowChange, explanation: Explanation) -> str:
-    moves = [
-        f"{one.old.input} {one.old.text} -> {one.new.text}" for one in change.moves
-    ]
+def _moves(change: RowChange, of: Explanation) -> str:
+    moves = [f"{move.input} {move.old} -> {move.new}" for move in change.moves]
     label = "no class" if change.label is None else change.label
     each = "each by at most " if len(moves) > 1 else ""
-    cost = _cost(change.cost or 0.0, explanation)
-    return f"to {label}: {some(moves, _MOST_MOVES)}; {each}{cost}"
+    return f"to {label}: {some(moves, _MOST_MOVES)}; {each}{_cost(change.cost, of)}"
 
 
-def _proof(change: RowChange, explanation: Explanation) -> str:
-    if change.verdict == "PROVED":
-        return "proved smallest"
-    return f"no change below {_cost(change.low, explanation)} does it; {change.why}"
-
-
-def _cost(cost: float, explanation: Explanation) -> str:
-    if explanation.unit == "cost":
+def _cost(cost: float, of: Explanation) -> str:
+    if of.unit == "cost":
         return f"cost {number(cost)}"
-    if cost == 1.0:
-        return "as much as a whole range"
-    return f"{100 * cost:.3g}% of its range"
+    return "a whole range" if cost == 1.0 else f"{100 * cost:.3g}% of its range"
 
 
-def _fired(explanation: Explanation) -> list[str]:
-    lines: list[str] = []
-    for rule in explanation.fired[:_MOST_RULES]:
-        shares = [f"{100 * one.value:.3g}% of {one.output}" for one in rule.shares]
+def _fired(of: Explanation) -> Iterator[str]:
+    for rule in of.fired[:_MOST_RULES]:
+        shares = [f"{100 * part:.3g}% of {name}" for name, part in rule.shares.items()]
         degree = f"rule {rule.rule}, degree {_short(rule.degree)}"
-        lines.append(f"{degree}, {some(shares, 2)}: {rule.sentence}")
-    rest = len(explanation.fired) - len(lines)
-    return [*lines, f"and {counted(rest, 'more rule')}"] if rest else lines
+        yield f"{degree}, {some(shares, _MOST_NAMES)}: {rule.sentence}"
+    if rest := of.fired[_MOST_RULES:]:
+        yield f"and {counted(len(rest), 'more rule')}"
 
 
-def _slopes(explanation: Explanation) -> list[str]:
-    return [
-        f"{name}: "
-        + some(
-            [
-                f"{one.slope:+.4g} per unit of {one.input}"
-                for one in explanation.slopes
-                if one.output == name
-            ],
-            _MOST_NAMES,
-        )
-        for name in [share.output for share in explanation.outputs][:_MOST_OUTPUTS]
-        if explanation.slopes
-    ]
-
-
-def _filled(explanation: Explanation) -> list[str]:
-    cells = [f"{cell.text} for a missing {cell.input}" for cell in explanation.filled]
-    return [some(cells, _MOST_NAMES)] if cells else []
-
-
-def _seen(explanation: Explanation) -> Sequence[str]:
-    counts = {one.label: one.rows for one in explanation.classes if one.rows}
-    if not counts:
-        return []
-    rows = ", ".join(f"{label} {count}" for label, count in counts.items())
-    return [f"{counted(sum(counts.values()), 'training row')} in this rule: {rows}"]
+def _slopes(of: Explanation) -> Iterator[str]:
+    for output, slopes in [*of.slopes.items()][:_MOST_OUTPUTS]:
+        texts = [f"{slope:+.4g} per unit of {name}" for name, slope in slopes.items()]
+        if texts:
+            yield f"{output}: {some(texts, _MOST_NAMES)}"

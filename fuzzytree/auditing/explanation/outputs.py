@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from msgspec.structs import replace
 
 from fuzzytree.auditing.decide.domain import Domain
-from fuzzytree.auditing.explanation.records import (
-    Explanation,
-    FiredRule,
-    Share,
-    Slope,
-)
+from fuzzytree.auditing.explanation.records import Explanation, FiredRule
 from fuzzytree.formats import conclusions_text, condition_sentence
 from fuzzytree.model import FuzzySystem, SystemRule
-from fuzzytree.semantics import Status, infer
+from fuzzytree.semantics import infer
 
 _STEP = 2.0**-16  # of an input's range, to both sides of the row
 
@@ -24,34 +19,38 @@ def explain_outputs(
     system: FuzzySystem, row: Mapping[str, float], domain: Domain, blank: Explanation
 ) -> Explanation:
     """Return which rules fire at a row, and how the outputs change near it."""
-    answer = infer(system, row)
     names = [output.name for output in system.outputs]
-    totals = dict.fromkeys(names, 0.0)
-    for rule, degree in zip(system.rules, answer.strengths, strict=True):
-        for output in {conclusion.output for conclusion in rule.then}:
-            totals[output] += degree
+    answer = infer(system, row)
+    degrees = [*zip(system.rules, answer.strengths, strict=True)]
+    ends = [{part.output for part in rule.then} for rule in system.rules]
+    totals = {
+        name: sum(d for (_, d), own in zip(degrees, ends, strict=True) if name in own)
+        for name in names
+    }
     fired = [
         FiredRule(
             number,
             _sentence(rule),
             degree,
-            tuple(
-                Share(output, degree / totals[output])
-                for output in dict.fromkeys(part.output for part in rule.then)
-            ),
+            {name: degree / totals[name] for name in names if name in ends[number - 1]},
         )
-        for number, (rule, degree) in enumerate(
-            zip(system.rules, answer.strengths, strict=True), 1
-        )
+        for number, (rule, degree) in enumerate(degrees, 1)
         if degree > 0.0
     ]
-    is_missing = answer.status == Status.MISSING
+    slopes: dict[str, dict[str, float]] = {name: {} for name in names}
+    for side in domain.sides if blank.status != "missing" else ():
+        x, step = row[side.variable], (side.high - side.low) * _STEP
+        low, high = max(x - step, min(side.low, x)), min(x + step, max(side.high, x))
+        if low < high:
+            at = [infer(system, {**row, side.variable: end}) for end in (low, high)]
+            pairs = zip(names, at[0].outputs, at[1].outputs, strict=True)
+            for name, first, last in pairs:
+                slopes[name][side.variable] = (last - first) / (high - low)
     return replace(
         blank,
-        status=Status(answer.status).name.lower(),
-        outputs=tuple(map(Share, names, answer.outputs)),
+        outputs=dict(zip(names, answer.outputs, strict=True)),
         fired=tuple(sorted(fired, key=lambda rule: -rule.degree)),
-        slopes=() if is_missing else tuple(_slopes(system, row, domain)),
+        slopes=slopes,
     )
 
 
@@ -60,23 +59,3 @@ def _sentence(rule: SystemRule) -> str:
     if rule.when is None:
         return f"ALWAYS {ends}"
     return f"IF {condition_sentence(rule.when)} THEN {ends}"
-
-
-def _slopes(
-    system: FuzzySystem, row: Mapping[str, float], domain: Domain
-) -> Iterator[Slope]:
-    """Yield the slope of each output in each input, output by output."""
-    slopes: dict[str, tuple[float, ...]] = {}
-    for side in domain.sides:
-        name, x = side.variable, row.get(side.variable)
-        if x is None:
-            continue
-        step = (side.high - side.low) * _STEP
-        low, high = max(x - step, min(side.low, x)), min(x + step, max(side.high, x))
-        if not low < high:
-            continue
-        ends = [infer(system, {**row, name: end}).outputs for end in (low, high)]
-        slopes[name] = tuple((b - a) / (high - low) for a, b in zip(*ends, strict=True))
-    for place, output in enumerate(system.outputs):
-        for name, numbers in slopes.items():
-            yield Slope(output.name, name, numbers[place])
