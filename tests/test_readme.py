@@ -25,6 +25,7 @@ LANDING = ROOT / "docs" / "index.md"
 PAGES = [
     README,
     LANDING,
+    ROOT / "docs" / "gallery.md",
     *sorted((ROOT / "docs" / "tutorials").glob("*.md")),
     ROOT / "docs" / "how-to" / "explain-one-decision.md",
     ROOT / "docs" / "how-to" / "require.md",
@@ -63,6 +64,8 @@ def test_every_example_prints_what_the_page_shows(page: Path, tmp_path: Path) ->
     text = page.read_text("utf-8")
     now = _masked(_rewritten_examples(text, tmp_path))
     assert now == _masked(text), "python tests/test_readme.py rewrites the page"
+    for shown, drawn in _pictures(page, tmp_path):
+        assert shown.read_text("utf-8") == drawn.read_text("utf-8"), shown.name
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
@@ -144,6 +147,14 @@ def _answered(session: str, folder: Path) -> Iterator[str]:
         yield f"{line}\n{done.stdout}"
 
 
+def _pictures(page: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
+    """Yield the pictures that a page shows and its commands have drawn in `out/`."""
+    for name in re.findall(r"!\[[^]]*\]\((\S+\.svg)\)", page.read_text("utf-8")):
+        shown = page.parent / name
+        if (drawn := folder / "out" / shown.name).exists():
+            yield shown, drawn
+
+
 def _printed(code: str, folder: Path) -> str:
     printed = io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
@@ -162,6 +173,8 @@ def _rewrite() -> None:
     for page in PAGES:
         with tempfile.TemporaryDirectory() as folder:
             text = _rewritten_examples(page.read_text("utf-8"), Path(folder))
+            for shown, drawn in _pictures(page, Path(folder)):
+                shown.write_text(drawn.read_text("utf-8"), "utf-8")
         page.write_text(text, "utf-8")
 
 
