@@ -74,7 +74,10 @@ class RunOptions(TableOptions):
     probabilities: bool = flag(
         "--probabilities", "Add a column with the probability of each class."
     )
-    why: bool = flag("--why", "Add the winning rule, with its degrees of membership.")
+    why: bool = flag(
+        "--why",
+        "Add the winning rule, with degrees below 1; `fuzzytree why` explains one row.",
+    )
     keep: bool = flag("--keep", "Add the columns of TABLE before the others.")
     runtime: str | None = option(
         "--runtime NAME", "Runtime that executes the model; native by default."

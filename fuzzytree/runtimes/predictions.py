@@ -406,7 +406,7 @@ def predictions_of(
 
 
 def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> list[str]:
-    """Return, for each row, its rule as a sentence with the degree of each proposition.
+    """Return, for each row, its rule as a sentence, with each degree that is below 1.
 
     A value that stands for a missing one is named after it.
 
@@ -453,10 +453,10 @@ def _reason(
     if status == Status.UNCOVERED:
         return "no rule fires"
     rule = rules.rules[number - 1]
+    degrees = [proposition_degree(p, shapes, axes[p.variable]) for p in rule.when]
     propositions = [
-        f"{proposition_text(one)} "
-        f"({_short(proposition_degree(one, shapes, axes[one.variable]))})"
-        for one in rule.when
+        proposition_text(one) + (f" ({_short(degree)})" if degree < 1.0 else "")
+        for one, degree in zip(rule.when, degrees, strict=True)
     ]
     text = f"IF {' AND '.join(propositions)} THEN " if propositions else "ALWAYS "
     if status == Status.DECIDED:

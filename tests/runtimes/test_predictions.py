@@ -121,7 +121,7 @@ def test_a_reason_names_the_values_that_stand_for_missing_ones() -> None:
     rules = RuleBase("grip", ("soft",), (age, eye, hair), (rule,))
     values = np.array([[1.0, math.nan, math.inf], [1.0, math.nan, 0.0], [0.0] * 3])
     answers = ft.run(rules, values.T, columns=["age", "eye", "hair"])
-    text = "IF age is low (1) THEN soft"
+    text = "IF age is low THEN soft"
     assert reasons(rules, values, answers) == [
         text,
         "IF age is low (0.75) THEN soft; missing and replaced: age by 1.5, "
