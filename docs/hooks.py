@@ -12,7 +12,7 @@ import inspect
 import json
 import pkgutil
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, MutableMapping, Sequence
 from html import escape, unescape
 from pathlib import Path
 
@@ -59,6 +59,15 @@ def on_page_content(html: str, **_: object) -> str:
     A session is copied without its prompts and output. Tables of options stay open.
     """
     return TABLE.sub(_behind_link, CODE.sub(_with_commands, html))
+
+
+def on_post_build(config: MutableMapping[str, str], **_: object) -> None:
+    """Write a page that leads on for each page that has moved."""
+    for old, new in MOVED.items():
+        folder = Path(config["site_dir"], old)
+        folder.mkdir(parents=True, exist_ok=True)
+        leads_on = f'<!doctype html><meta http-equiv="refresh" content="0; url={new}">'
+        (folder / "index.html").write_text(leads_on, "utf-8")
 
 
 def _behind_link(table: re.Match[str]) -> str:
@@ -214,6 +223,7 @@ def _on_one_line(cell: str) -> str:
     return text if text.startswith("`") else text.replace("|", "\\|")
 
 
+MOVED = {"how-to/notebook": "../use-results-in-python/"}
 GROUPS = {
     "learn": (
         *("learn", "LearningSettings", "FuzzyTreeClassifier", "Learner", "LeafCounts"),

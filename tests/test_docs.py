@@ -185,6 +185,14 @@ def test_a_session_is_copied_without_its_prompts_and_output() -> None:
     assert HOOKS["on_page_content"](output) == output
 
 
+def test_a_page_that_has_moved_leads_to_the_new_one(tmp_path: Path) -> None:
+    HOOKS["on_post_build"]({"site_dir": str(tmp_path)})
+    for old, new in HOOKS["MOVED"].items():
+        assert f"url={new}" in (tmp_path / old / "index.html").read_text("utf-8")
+        assert (DOCS / old / new).resolve().with_suffix(".md").exists()
+        assert not (DOCS / old).with_suffix(".md").exists()
+
+
 def test_a_long_table_stands_behind_a_link() -> None:
     row = "<tr><td>a</td></tr>"
     long = f"<table><tr><th>file</th></tr>{41 * row}</table>"

@@ -15,7 +15,6 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "fuzzy-libraries.md": ("skfuzzy", "simpful"),
     "ibis.md": ("ibis",),
     "large-tables.md": ("pandas",),
-    "notebook.md": ("pandas",),
     "parts.md": ("pandas",),
     "polars.md": ("polars",),
     "use-results-in-python.md": ("pandas", "sklearn"),
