@@ -72,7 +72,7 @@ def test_a_fuzzy_system_is_examined_like_rules(call: Call) -> None:
     [
         (
             ("--select", "N99"),
-            "no criterion 'N99'; there is N1, N2, N2b, N3, N4, N5, N6, N7, N8, N9, N10",
+            "no criterion 'N99'; there is N1, N2, N3, N4, N5, N6, N7, N8, N9, N10",
         ),
         (("--runtime", "no"), "no runtime 'no'; there is reference, native"),
     ],

@@ -30,7 +30,7 @@ from fuzzytree.checking.stability.runs import (
 )
 from fuzzytree.checking.stability.sensitivity import input_scales
 from fuzzytree.checking.stability.transforms import UnitChange, in_units, moved
-from fuzzytree.errors import FuzzyTreeError, InvalidModelError
+from fuzzytree.errors import InvalidModelError
 from fuzzytree.model import (
     LR,
     Activation,
@@ -370,47 +370,18 @@ def edges(model: Document, runtimes: Sequence[Runtime]) -> Criterion:
     return trial.result()
 
 
-_COPIES = 50  # rows of a table whose columns are all constant
 _ADVICE_DEGENERATE = (
     "a set made from one value must keep degree 1 at that value: compare values with "
     "the mean before dividing by the spread"
 )
 
 
-def degenerate(
-    model: Document, runtimes: Sequence[Runtime], values: FloatArray
-) -> Criterion:
-    """Collapse every term to its narrowest and every table to its smallest (N4).
+def degenerate(model: Document, runtimes: Sequence[Runtime]) -> Criterion:
+    """Collapse every term to its narrowest (N4).
 
     A collapsed set keeps degree exactly 1 at its mean or on its plateau, is exactly 0
-    from its end on, and no runtime warns. A table of equal rows, given without copies
-    (its columns have no stride), is answered like one of them; so are tables of two,
-    one and no rows.
+    from its end on, and no runtime warns.
     """
     trial = Trial("N4", _ADVICE_DEGENERATE)
     _try_terms(trial, model, runtimes, "{}, collapsed", collapsed)
-    for one in loaded_forms(model, runtimes, trial.skipped):
-        for fault in _small_tables(one, one.some(values)):
-            trial.add(1, fault)
     return trial.result()
-
-
-def _small_tables(one: LoadedForm, values: FloatArray) -> Iterator[str | None]:
-    """Try small tables; yield for each what went wrong, if anything."""
-    width, count = values.shape
-    for row in range(min(count, 3)):
-        column = values[:, row : row + 1]
-        table = np.broadcast_to(column, (width, _COPIES))
-        alone = one.run(np.ascontiguousarray(column)).part(np.zeros(_COPIES, np.int64))
-        fault = f": {_COPIES} equal rows are not answered like one of them"
-        yield one.fault(fault, table, one.run(table), alone)[1]
-    for size in (0, 1, 2):
-        try:
-            outcome = one.run(np.ascontiguousarray(values[:, :size]))
-        except FuzzyTreeError as error:
-            yield f"{one.title}: a table of {size} rows is refused: {error}"
-            continue
-        shape = (min(size, count),)
-        is_wrong = outcome.rule.shape != shape or outcome.status.shape != shape
-        answers = f"a table of {size} rows gets {outcome.rule.shape[0]} answers"
-        yield f"{one.title}: {answers}" if is_wrong else None

@@ -10,7 +10,6 @@ from fuzzytree.checking.comparing import row_set
 from fuzzytree.checking.stability.exactness import degenerate, edges, exactness, offsets
 from fuzzytree.checking.stability.results import TITLES, Criterion, Stability, Trial
 from fuzzytree.checking.stability.row_checks import (
-    decades,
     order,
     roundtrips,
     scaling,
@@ -52,7 +51,7 @@ def examine(
         runtimes: What to run; those that are not installed are named and left out.
         formats: What to write and take back.
         data: Rows of one's own, shape (inputs, rows); at most 1,000, evenly drawn.
-        select: The codes of criteria to apply; all if empty. `N2` includes `N2b`.
+        select: The codes of criteria to apply; all if empty.
         progress: Called with the current check and the share that is done, in [0, 1].
 
     Returns:
@@ -80,9 +79,8 @@ def examine(
     checks: dict[str, Callable[[], Criterion]] = {
         "N1": lambda: scaling(model, runtimes, some),
         "N2": lambda: offsets(model, runtimes, rows),
-        "N2b": lambda: decades(model, runtimes, some),
         "N3": lambda: order(model, runtimes, some),
-        "N4": lambda: degenerate(model, runtimes, some),
+        "N4": lambda: degenerate(model, runtimes),
         "N5": lambda: edges(model, runtimes),
         "N6": lambda: specials(model, runtimes, some),
         "N7": lambda: curves(model),
@@ -109,12 +107,10 @@ def examine(
 
 
 def _wanted(select: Sequence[str]) -> tuple[str, ...]:
-    select = as_names(select)
-    codes = [code.upper().replace("B", "b") for code in select]
-    for text, code in zip(select, codes, strict=True):
+    codes = {code.upper(): code for code in as_names(select)}
+    for code, text in codes.items():
         if code not in TITLES:
             raise ValueError(f"no criterion {text!r}; there is {', '.join(TITLES)}")
-    codes += ["N2b"] * ("N2" in codes)
     return tuple(code for code in TITLES if not codes or code in codes)
 
 

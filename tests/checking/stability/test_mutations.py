@@ -10,15 +10,15 @@ import pytest
 
 from fuzzytree.checking.stability.exactness import degenerate, edges, exactness, offsets
 from fuzzytree.checking.stability.row_checks import (
-    decades,
     order,
     roundtrips,
     scaling,
     specials,
 )
 from fuzzytree.checking.stability.sensitivity import curves
+from fuzzytree.errors import ReadError
 from fuzzytree.exporters.table import find_format
-from fuzzytree.model.contracts import Model, Runtime
+from fuzzytree.model.contracts import Document, Model, Outcome, Run, Runtime
 from fuzzytree.model.rulebase import LR, Band, Side, Term
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.probing import probe_values
@@ -43,9 +43,9 @@ def test_n1_finds_a_runtime_with_a_fixed_threshold(rows: FloatArray) -> None:
     assert scaling(RULES, [defects.NATIVE], rows).verdict == "holds"
 
 
-def test_n2b_finds_a_runtime_with_one_unit_for_all_inputs(rows: FloatArray) -> None:
-    assert decades(RULES, [defects.COMMON_SCALE], rows).verdict == "FAILS"
-    assert decades(RULES, [defects.NATIVE], rows).verdict == "holds"
+def test_n1_finds_a_runtime_with_one_unit_for_all_inputs(rows: FloatArray) -> None:
+    assert scaling(RULES, [defects.COMMON_SCALE], rows).verdict == "FAILS"
+    assert scaling(RULES, [defects.NATIVE], rows).verdict == "holds"
 
 
 def test_n3_finds_a_runtime_that_sums_over_the_batch(rows: FloatArray) -> None:
@@ -53,6 +53,32 @@ def test_n3_finds_a_runtime_that_sums_over_the_batch(rows: FloatArray) -> None:
     assert result.verdict == "FAILS"
     assert "answered differently in a batch of 1" in " ".join(result.detail)
     assert order(RULES, [defects.NATIVE], rows).verdict == "holds"
+
+
+def test_n3_finds_a_runtime_that_refuses_tables_of_no_row(rows: FloatArray) -> None:
+    def load(model: Document) -> Run:
+        run = defects.NATIVE.load(model)
+
+        def answer(values: FloatArray) -> Outcome:
+            if not values.size:
+                raise ReadError("the table has no row")
+            return run(values)
+
+        return answer
+
+    result = order(RULES, [msgspec.structs.replace(defects.NATIVE, load=load)], rows)
+    assert result.detail == (
+        "native: rules: rows in a batch of 0 are refused: the table has no row",
+    )
+
+
+def test_n3_finds_a_runtime_that_drops_the_last_of_two_rows(rows: FloatArray) -> None:
+    def load(model: Document) -> Run:
+        run = defects.NATIVE.load(model)
+        return lambda values: run(values[:, :1] if values.shape[1] == 2 else values)
+
+    result = order(RULES, [msgspec.structs.replace(defects.NATIVE, load=load)], rows)
+    assert result.detail[0] == "native: rules: 2 rows get 1 answers in a batch of 2"
 
 
 @pytest.mark.parametrize(
@@ -63,14 +89,12 @@ def test_n3_finds_a_runtime_that_sums_over_the_batch(rows: FloatArray) -> None:
     ],
     ids=["warns", "no spread"],
 )
-def test_n4_finds_a_runtime_that_divides_by_nothing(
-    rows: FloatArray, defect: Runtime, said: str
-) -> None:
-    result = degenerate(RULES, [defect], rows)
+def test_n4_finds_a_runtime_that_divides_by_nothing(defect: Runtime, said: str) -> None:
+    result = degenerate(RULES, [defect])
     assert result.verdict == "FAILS"
     assert said in result.detail[0]
     for sound in (defects.NATIVE, defects.PLAIN):
-        assert degenerate(RULES, [sound], rows).verdict == "holds"
+        assert degenerate(RULES, [sound]).verdict == "holds"
 
 
 @pytest.mark.heavy
