@@ -15,6 +15,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, MutableMapping, Sequence
 from html import escape, unescape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 import griffe
@@ -27,6 +28,9 @@ from fuzzytree.exporters.table import all_formats
 from fuzzytree.model.options import options_of
 from fuzzytree.report.formats import promise_of
 from fuzzytree.runtimes.table import all_runtimes
+
+if TYPE_CHECKING:
+    from mkdocs.structure.pages import Page
 
 MARK = re.compile(r"<!-- generated: (\w+) -->")
 CODE = re.compile(
@@ -48,8 +52,15 @@ class Examples(griffe.Extension):
             )
 
 
-def on_page_markdown(markdown: str, **_: object) -> str:
-    """Return a page with its marks replaced by what they name."""
+def on_page_markdown(markdown: str, page: Page | None = None, **_: object) -> str:
+    """Return a page with its marks replaced by what they name.
+
+    The search finds a page by its words in `WORDS`, too, and guides before the API.
+    """
+    if page and page.file.src_uri in WORDS:
+        page.meta["tags"] = [*WORDS[page.file.src_uri]]
+    if page and page.file.src_uri.startswith("reference/api"):
+        page.meta["search"] = {"boost": 0.5}
     return MARK.sub(lambda mark: "\n".join(PARTS[mark[1]]()), markdown)
 
 
@@ -223,6 +234,23 @@ def _on_one_line(cell: str) -> str:
     return text if text.startswith("`") else text.replace("|", "\\|")
 
 
+WORDS = {
+    "alternatives.md": ("comparison", "compare tools", "versus"),
+    "gallery.md": ("pictures", "plots"),
+    "explanation/equivalence.md": ("proof",),
+    "explanation/quality.md": ("accuracy", "benchmark"),
+    "how-to/audit.md": ("audit", "review"),
+    "how-to/bench.md": ("speed", "latency"),
+    "how-to/everyday-tables.md": ("missing values", "categories", "dates"),
+    "how-to/explain-one-decision.md": ("why", "counterfactual", "explain"),
+    "how-to/install.md": ("install", "uninstall", "pip"),
+    "how-to/use-results-in-python.md": ("notebook", "jupyter"),
+    "how-to/what-if-page.md": ("what-if", "sliders"),
+    "reference/c.md": ("microcontroller", "arduino", "embedded"),
+    "reference/findings.md": ("dead rule", "conflict", "gap"),
+    "reference/formats.md": ("export", "convert"),
+    "tutorials/first-model.md": ("learn", "tutorial"),
+}
 MOVED = {"how-to/notebook": "../use-results-in-python/"}
 GROUPS = {
     "learn": (

@@ -17,6 +17,7 @@ import pytest
 pytestmark = pytest.mark.heavy
 
 ROOT = Path(__file__).resolve().parents[2]
+SEARCH_RESULT = ".md-search-result__item > a"
 
 
 class _Silent(http.server.SimpleHTTPRequestHandler):
@@ -57,6 +58,31 @@ def test_the_copy_button_of_a_session_copies_its_commands(
     assert copied.splitlines() == [
         line.removeprefix("$ ") for line in session if line.startswith("$ ")
     ]
+
+
+@pytest.mark.parametrize(
+    ("words", "page"),
+    [
+        ("why", "how-to/explain-one-decision/"),
+        ("counterfactual", "how-to/explain-one-decision/"),
+        ("install", "how-to/install/"),
+        ("what-if", "how-to/what-if-page/"),
+        ("notebook", "how-to/use-results-in-python/"),
+        ("microcontroller", "reference/c/"),
+        ("missing values", "how-to/everyday-tables/"),
+        ("dead rule", "reference/findings/"),
+        ("compare tools", "alternatives/"),
+        ("learn", "tutorials/first-model/"),
+        ("audit", "how-to/audit/"),
+        ("export", "reference/formats/"),
+    ],
+)
+def test_the_search_names_the_right_page_first(
+    browser: Any, site: str, words: str, page: str
+) -> None:
+    browser.get(f"{site}/?q={words.replace(' ', '+')}")
+    links = _soon(lambda: browser.find_elements("css selector", SEARCH_RESULT))
+    assert links[0].get_attribute("href").split("?")[0] == f"{site}/{page}"
 
 
 def _soon(result: Callable[[], Any], *, seconds: float = 20) -> Any:
