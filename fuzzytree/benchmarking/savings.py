@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import msgspec
 import numpy as np
@@ -16,9 +16,9 @@ from msgspec.structs import replace
 
 from fuzzytree.benchmarking.clock import time_calls
 from fuzzytree.benchmarking.records import Timing
-from fuzzytree.checking import Needs, needs, prove, sizes_of
+from fuzzytree.checking import Needs, needs, prove
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.exporters import find_format
+from fuzzytree.exporters import contents, find_format
 from fuzzytree.exporters import write_onnx as write_onnx
 from fuzzytree.model import (
     Agreement,
@@ -36,6 +36,7 @@ from fuzzytree.tables import batches, path_of
 
 if TYPE_CHECKING:
     from fuzzytree.benchmarking.clock import Call
+    from fuzzytree.exporters import Output
     from fuzzytree.model import FloatArray
 
 ALL_COLUMNS, AS_IT_IS, PRUNED = "all columns", "as it is", "pruned"
@@ -241,8 +242,26 @@ def _files(
                 omissions.append(f"{title} as {form.name}: {error}")
                 continue
             yield File(title, form.name, None, len(written.content))
-    for title, dtype, size in sizes_of(model, uses, omissions):
-        yield File(title, "onnx", dtype, size.bytes, size.nodes, size.constants)
+    usual: tuple[Output, ...] = ("label", "rule")
+    usual = ("outputs", "status") if model.outputs else usual
+    for title, representation in forms(model, uses).items():
+        for dtype in _graph_types(representation):
+            try:
+                written = write_onnx(
+                    representation, dtype=dtype, outputs=usual, verify=False
+                )
+            except (LossError, MissingExtraError) as error:
+                omissions.append(f"{title} in {dtype}: {error}")
+                continue
+            size = contents(written.content)
+            yield File(title, "onnx", dtype, size.bytes, size.nodes, size.constants)
+
+
+def _graph_types(model: Document) -> tuple[Dtype, ...]:
+    """Return the number types whose ONNX graphs of a form differ."""
+    if model.outputs:
+        return ("float64",)
+    return get_args(Dtype) if model.rules else ("float64", "float32")
 
 
 # --- costs

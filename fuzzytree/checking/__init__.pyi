@@ -24,12 +24,9 @@ from .converting import read as read
 from .converting import read_content as read_content
 from .converting import reading_format as reading_format
 from .converting import refuse_unreadable as refuse_unreadable
-from .dependencies import Because as Because
-from .dependencies import Graph as Graph
 from .dependencies import Needs as Needs
 from .dependencies import needs as needs
 from .dependencies import prove as prove
-from .dependencies import sizes_of as sizes_of
 from .files import ProgramFile as ProgramFile
 from .kinds import CALLED as CALLED
 from .kinds import formed as formed

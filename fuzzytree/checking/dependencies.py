@@ -1,16 +1,9 @@
-"""What a model needs, what the rest costs, and the proof that it may go.
-
-A graph's operators are listed with what they are there for. No such list is written
-by hand: the model is written once more without the thing, a negation say, and
-what is missing from that graph was there because of it.
-"""
+"""What a model needs, and the proof that the rest may go."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from types import MappingProxyType
-from typing import TYPE_CHECKING, cast, get_args
+from collections.abc import Collection, Iterator, Sequence
+from typing import TYPE_CHECKING, cast
 
 import msgspec
 import numpy as np
@@ -24,24 +17,15 @@ from fuzzytree.checking.comparing import (
     counted,
     row_set,
 )
-from fuzzytree.checking.equivalence import with_functions
-from fuzzytree.errors import LossError, MissingExtraError
-from fuzzytree.exporters import Contents, contents
 from fuzzytree.exporters import write_onnx as write_onnx
 from fuzzytree.model import (
-    LR,
     Agreement,
     Comparison,
-    Curve,
     Document,
-    Dtype,
     FloatArray,
     FuzzyTree,
-    Model,
     ModelKind,
     Outcome,
-    Proposition,
-    RuleBase,
     Runtime,
     Use,
     fingerprint,
@@ -52,7 +36,6 @@ from fuzzytree.semantics import (
     Pruned,
     Removed,
     forms,
-    free_axes,
     probe_values,
     proof_faults,
     pruned,
@@ -60,45 +43,7 @@ from fuzzytree.semantics import (
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.exporters import Output
-    from fuzzytree.semantics import Form
-
-
-class Because(msgspec.Struct, frozen=True):
-    """The part of a graph that one feature of a model causes.
-
-    Attributes:
-        what: The thing, as people name it.
-        operators: How many nodes of each operator fewer there are without it; below 0
-            where there are more.
-        bytes: How many bytes fewer.
-    """
-
-    what: str
-    operators: dict[str, int]
-    bytes: int
-
-
-class Graph(msgspec.Struct, frozen=True):
-    """The ONNX graph of one representation and number type, with label and rule.
-
-    The causes are listed for `float64`; the other types differ by a cast.
-
-    Attributes:
-        representation: `tree`, `relative rules`, `raw rules`, `rules` or `system`.
-        dtype: The number type.
-        contents: How large it is.
-        because: What of it is there on account of what the model has.
-        on_request: What further outputs would add, counted alike.
-        left_out: What the model does not have, of which the graph has nothing.
-    """
-
-    representation: str
-    dtype: Dtype
-    contents: Contents
-    because: tuple[Because, ...] = ()
-    on_request: tuple[Because, ...] = ()
-    left_out: tuple[str, ...] = ()
+    pass
 
 
 class Needs(msgspec.Struct, frozen=True):
@@ -116,8 +61,6 @@ class Needs(msgspec.Struct, frozen=True):
         sets: How many fitted sets there are; only a tree has them.
         rules: How many rules or leaves there are.
         idle: All that could go; what that would change is said with it.
-        graphs: Its ONNX graphs, and what is in them for what.
-        omissions: Why there is no graph, where there is none.
         outputs: Those of a fuzzy system.
     """
 
@@ -132,8 +75,6 @@ class Needs(msgspec.Struct, frozen=True):
     sets: int
     rules: int
     idle: tuple[Removed, ...]
-    graphs: tuple[Graph, ...] = ()
-    omissions: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
 
 
@@ -149,7 +90,6 @@ def needs(model: Document, *, uses: Collection[Use] = ("tree", "relative")) -> N
     """
     used = pruned(model, uses=uses, inputs=True).model
     left = pruned(model, uses=uses, inputs=True, rules=True)
-    graphs, omissions = _graphs(model)
     return Needs(
         model=model.name,
         fingerprint=fingerprint(model),
@@ -163,130 +103,8 @@ def needs(model: Document, *, uses: Collection[Use] = ("tree", "relative")) -> N
         sets=sum(len(group.terms) for group in model.sets),
         rules=len(model.rule_labels) or len(model.rules),
         idle=left.removed,
-        graphs=graphs,
-        omissions=omissions,
         outputs=tuple(output.name for output in model.outputs),
     )
-
-
-# --- graphs
-
-
-def _usual(model: Document) -> tuple[Output, ...]:
-    return ("outputs", "status") if model.outputs else ("label", "rule")
-
-
-def sizes_of(
-    model: Document, uses: Collection[Use], omissions: list[str]
-) -> Iterator[tuple[Form, Dtype, Contents]]:
-    """Yield each form of a model and number type with what is in its ONNX graph.
-
-    Args:
-        model: A tree, a rule base or a fuzzy system.
-        uses: What a tree serves.
-        omissions: Gets a sentence for each that cannot be written.
-    """
-    for title, form in forms(model, uses).items():
-        for dtype in get_args(Dtype):
-            if not form.rules and dtype == "mixed":
-                continue  # a path has comparisons alone: it is float64
-            if form.outputs and dtype != "float64":
-                continue  # graphs of systems are in double
-            try:
-                yield title, dtype, _written(form, dtype, _usual(form))
-            except (LossError, MissingExtraError) as error:
-                omissions.append(f"{title} in {dtype}: {error}")
-
-
-def _graphs(model: Document) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
-    omissions: list[str] = []
-    every = forms(model)
-    graphs = [
-        Graph(title, dtype, whole)
-        if dtype != "float64"
-        else _explained(title, every[title], whole)
-        for title, dtype, whole in sizes_of(model, get_args(Use), omissions)
-    ]
-    return tuple(graphs), tuple(omissions)
-
-
-def _explained(title: str, model: Document, whole: Contents) -> Graph:
-    """Return a graph in double with what is in it for what."""
-    usual = _usual(model)
-    more: tuple[Output, ...] = ("status",)
-    if model.rules:
-        more = ("activations",) if model.outputs else ("status", "strengths")
-    on_request = [
-        _because(f"output {one}", _written(model, "float64", (*usual, one)), whole)
-        for one in more
-    ]
-    because: list[Because] = []
-    left_out: list[str] = []
-    others: dict[str, Document] = {}
-    if model.classes:
-        decider = cast("Model", model)
-        has_combinations = any(variable.parts for variable in model.variables)
-        others[COMBINATIONS] = free_axes(decider) if has_combinations else model
-        if model.rules:
-            rules = cast("RuleBase", model)
-            others |= {what: without(rules) for what, without in _FEATURES.items()}
-    for what, other in others.items():
-        if other == model:
-            left_out.append(what)
-        else:
-            because.append(_because(what, whole, _written(other, "float64", usual)))
-    reasons = (tuple(because), tuple(on_request), tuple(left_out))
-    return Graph(title, "float64", whole, *reasons)
-
-
-def _written(model: Document, dtype: Dtype, outputs: Sequence[Output]) -> Contents:
-    written = write_onnx(model, dtype=dtype, outputs=outputs, verify=False)
-    return contents(written.content)
-
-
-def _because(what: str, whole: Contents, without: Contents) -> Because:
-    fewer = Counter(whole.operators)
-    fewer.subtract(without.operators)
-    operators = {name: count for name, count in sorted(fewer.items()) if count}
-    return Because(what, operators, whole.bytes - without.bytes)
-
-
-def _with_rules(
-    rules: RuleBase, change: Callable[[Proposition], Proposition]
-) -> RuleBase:
-    """Return a rule base with other propositions."""
-    changed = [replace(r, when=tuple(map(change, r.when))) for r in rules.rules]
-    return replace(rules, rules=tuple(changed))
-
-
-def _straight(curve: Curve) -> Curve:
-    """Return a membership function whose sides have one number."""
-    if not isinstance(curve, LR):
-        return curve
-    sides = [replace(side, curve=side.curve[:1]) for side in (curve.left, curve.right)]
-    return replace(curve, left=sides[0], right=sides[1])
-
-
-COMBINATIONS = "combinations"
-
-_FEATURES: Mapping[str, Callable[[RuleBase], Document]] = MappingProxyType(
-    {
-        "negation": lambda rules: _with_rules(
-            rules, lambda proposition: replace(proposition, hedges=())
-        ),
-        "OR of terms": lambda rules: _with_rules(
-            rules, lambda proposition: replace(proposition, terms=proposition.terms[:1])
-        ),
-        "product as AND": lambda rules: replace(
-            rules, semantics=replace(rules.semantics, conjunction="minimum")
-        ),
-        "an answer of its own for missing values": lambda rules: replace(
-            rules, semantics=replace(rules.semantics, missing=rules.semantics.uncovered)
-        ),
-        "curves": lambda rules: with_functions(rules, _straight),
-    }
-)
-"""What rules may have, and the rules without it: the same if they have none."""
 
 
 # --- the proof

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.benchmarking import Cost, File, Footprint, Size, times_faster
-from fuzzytree.checking import Because, Graph, Needs
+from fuzzytree.checking import Needs
 from fuzzytree.model import ModelKind
 from fuzzytree.report.text import (
     agreement_lines,
@@ -25,7 +25,7 @@ def report_lines(footprint: Footprint, *, is_verbose: bool = False) -> Iterator[
 
     Args:
         footprint: The report.
-        is_verbose: Whether to print each comparison, graph and file.
+        is_verbose: Whether to print each comparison and file.
     """
     needs = footprint.needs
     most = None if is_verbose else _MOST
@@ -36,9 +36,6 @@ def report_lines(footprint: Footprint, *, is_verbose: bool = False) -> Iterator[
     if more:
         yield from _removed_lines("left in, and could go on request", more, most)
     yield from agreement_lines(footprint.proof, is_verbose=is_verbose)
-    if is_verbose and needs.graphs:
-        yield ""
-        yield from _graph_lines(needs.graphs)
     yield ""
     rows = [*_size_rows(footprint.sizes)]
     yield from aligned(rows if is_verbose else rows[:_SIZES])
@@ -46,8 +43,7 @@ def report_lines(footprint: Footprint, *, is_verbose: bool = False) -> Iterator[
         yield ""
         yield from aligned(_cost_rows(footprint.costs))
         yield "median of one call in one thread; in brackets the 95 % interval"
-    missing = [*dict.fromkeys([*needs.omissions, *footprint.omissions])]
-    lines = [f"not reported: {text}" for text in missing]
+    lines = [f"not reported: {text}" for text in footprint.omissions]
     yield from first_lines(lines, most, "omission")
 
 
@@ -95,41 +91,6 @@ def _removed_lines(
     rows += [(one.where, one.why, one.changes or "nothing") for one in removed[:most]]
     yield from aligned(rows)
     yield from more_line(len(removed) - len(rows) + 1, "part")
-
-
-# --- graphs
-
-
-def _graph_lines(graphs: Sequence[Graph]) -> Iterator[str]:
-    rows: list[tuple[str, ...]] = [
-        ("onnx graph", "numbers", "bytes", "nodes", "constants")
-    ]
-    for graph in graphs:
-        inside = graph.contents
-        sizes = (inside.bytes, inside.nodes, inside.constants)
-        rows.append((graph.representation, graph.dtype, *map(str, sizes)))
-    yield from aligned(rows)
-    for graph in graphs:
-        if graph.because or graph.left_out:
-            yield f"{graph.representation}: {_operators(graph.contents.operators)}"
-            for one in graph.because:
-                yield f"  for {one.what}: {_because_text(one)}"
-            for one in graph.on_request:
-                yield f"  {one.what} would add: {_because_text(one)}"
-            if graph.left_out:
-                yield f"  nothing for {', '.join(graph.left_out)}"
-
-
-def _because_text(one: Because) -> str:
-    nodes = counted(sum(one.operators.values()), "node")
-    return f"{nodes} ({_operators(one.operators) or 'none'}), {one.bytes} bytes"
-
-
-def _operators(operators: Mapping[str, int]) -> str:
-    """Return operators with their counts, such as `Add 2, Mul`."""
-    return ", ".join(
-        name if count == 1 else f"{name} {count}" for name, count in operators.items()
-    )
 
 
 # --- savings

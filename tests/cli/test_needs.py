@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.checking import dependencies
 from fuzzytree.exporters.table import TABLE
 from fuzzytree.model.rulebase import Band, Term, Variable
 from fuzzytree.runtimes import Outputs
@@ -171,7 +170,6 @@ def test_without_onnx_the_rest_is_reported(
     def missing(*_model: object, **_options: object) -> object:
         raise MissingExtraError("writing onnx needs the extra 'onnx'")
 
-    monkeypatch.setattr(dependencies, "write_onnx", missing)
     monkeypatch.setattr("fuzzytree.benchmarking.savings.write_onnx", missing)
     code, out, _ = call("needs", "grip.yaml")
     assert code == 0
