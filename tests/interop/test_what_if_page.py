@@ -188,16 +188,17 @@ def test_a_row_comes_from_the_address_and_goes_into_it(
     seen = opened(browser, tmp_path, ft.page(rule_base()))
     seen.browser.get(f"{seen.place.as_uri()}#pressure=2&area=41")
     seen.browser.refresh()
-    assert seen.run("return document.getElementById('answer').innerText") == "loose"
+    answer = "return document.getElementById('answer').innerText"
+    assert seen.run(answer) == "loose1.000"
     command = "return document.getElementById('command').textContent"
     assert seen.run(command) == "fuzzytree why MODEL --row pressure=2,area=41"
     keys = import_module("selenium.webdriver.common.keys").Keys
     slider = seen.browser.find_element("css selector", "input[type=range]")
-    assert slider.get_attribute("aria-label") == "pressure in kPa"
+    assert slider.get_attribute("aria-label") == "pressure kPa"
     slider.send_keys(keys.END)
     wait_until(seen, lambda: seen.browser.current_url.endswith("10&area=41"))
     assert seen.run(command) == "fuzzytree why MODEL --row pressure=10,area=41"
-    assert "no class" in seen.run("return document.getElementById('answer').innerText")
+    assert "no class" in seen.run(answer)
 
 
 def test_categories_are_chosen_by_name_and_a_missing_value_is_replaced(
@@ -211,9 +212,40 @@ def test_categories_are_chosen_by_name_and_a_missing_value_is_replaced(
     word = one.categories[-1]
     seen.browser.get(f"{seen.place.as_uri()}#{quote(one.name)}={quote(word)}")
     seen.browser.refresh()
-    text = seen.run("return document.getElementById('command').textContent")
-    assert f"{one.name}={word}" in text
+    command = "return document.getElementById('command').textContent"
+    assert f"{one.name}={word}" in seen.run(command)
+    box = seen.browser.find_element("css selector", "input[type=checkbox]")
+    box.click()
+    wait_until(seen, lambda: f"{one.name}=," in seen.run(command))
+    assert seen.browser.find_element("css selector", ".missing").text == (
+        f"missing (as {one.categories[int(one.missing or 0)]})"
+    )
     assert seen.errors() == []
+
+
+def test_a_click_on_the_surface_moves_there(browser: Any, tmp_path: Path) -> None:
+    seen = opened(browser, tmp_path, ft.page(rule_base()))
+    seen.show(wide=1200)
+    plot = seen.browser.find_element("id", "plot")
+    seen.run("arguments[0].scrollIntoView()", plot)
+    plot.click()
+    command = "return document.getElementById('command').textContent"
+    wait_until(seen, lambda: "pressure=5,area=50" in seen.run(command))
+
+
+def test_a_page_names_the_rule_that_decides(browser: Any, tmp_path: Path) -> None:
+    table = ft.table(_WINE)
+    tree = ft.learn(table, target="cultivar", leaves=5)
+    seen = opened(browser, tmp_path, ft.page(tree, table))
+    button = seen.browser.find_element("css selector", "[aria-label='Next row']")
+    result: Any = ft.run(tree, table)
+    words: list[str] = []
+    for _ in range(20):
+        text = seen.run("return document.getElementById('why').textContent")
+        words.append(text.partition(" decides")[0])
+        button.click()
+        seen.run("update()")
+    assert words == [f"Rule {rule}" for rule in result.rule[:20]]
 
 
 def test_all_that_moves_has_a_name_and_keys_reach_it(

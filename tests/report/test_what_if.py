@@ -68,7 +68,7 @@ def test_no_name_becomes_markup() -> None:
 
 def test_the_ends_of_an_input_are_those_of_its_range() -> None:
     pressure = input_of(what_if_page(rule_base()).html, "pressure")
-    assert (pressure["low"], pressure["high"]) == (0.0, 10.0)
+    assert (pressure["from"], pressure["to"]) == (0.0, 10.0)
     assert (pressure["step"], pressure["start"]) == (0.05, 5.0)
 
 
@@ -76,15 +76,15 @@ def test_the_ends_of_an_input_without_a_range_are_those_of_its_terms() -> None:
     rules = rule_base()
     inputs = tuple(replace(one, low=None, high=None) for one in rules.variables)
     pressure = input_of(what_if_page(replace(rules, variables=inputs)).html, "pressure")
-    assert (pressure["low"], pressure["high"]) == (2.0, 8.0)
+    assert (pressure["from"], pressure["to"]) == (2.0, 8.0)
 
 
 def test_the_ends_of_an_input_are_those_of_the_rows_where_there_are_some() -> None:
     values = np.array([[3.0, 4.0, np.nan], [1.0, 1.0, 1.0]])
     page = what_if_page(rule_base(), values)
     pressure, area = (input_of(page.html, name) for name in ("pressure", "area"))
-    assert (pressure["low"], pressure["high"]) == (3.0, 4.0)
-    assert (area["low"], area["high"]) == (0.5, 1.5)
+    assert (pressure["from"], pressure["to"]) == (3.0, 4.0)
+    assert (area["from"], area["to"]) == (0.5, 1.5)
     assert (pressure["start"], page.rows) == (3.0, 3)
     assert facts_of(page.html)["rows"] == [[3.0, 1.0], [4.0, 1.0], [None, 1.0]]
 
@@ -110,7 +110,7 @@ def test_lines_between_the_points_of_a_term_are_near_its_degrees(seed: int) -> N
     system = random_system(seed)
     facts = facts_of(what_if_page(system).html)["variables"]
     for variable, fact in zip(system.variables, facts, strict=True):
-        values = np.linspace(fact["low"], fact["high"], 301)
+        values = np.linspace(fact["from"], fact["to"], 301)
         curves = {curve.name: curve for curve in axis_of(variable).curves}
         for term in (term for term in fact["terms"] if "points" in term):
             places, degrees = np.array(term["points"]).T

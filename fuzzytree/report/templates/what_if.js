@@ -1,281 +1,259 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
-const facts = JSON.parse($("facts").textContent);
-const model = fuzzytree[facts.name];
-const { variables, rules, outputs, classes } = facts;
-const inputs = variables.filter((one) => one.parts.length === 0);
+const facts = JSON.parse($("facts").textContent), model = fuzzytree[facts.name];
+const { classes = [], rows = [] } = facts; // what is empty is left out
+const whole = (one) => ({ parts: [], categories: [], terms: [], unit: "", ...one });
+const variables = facts.variables?.map(whole) ?? [], outputs = facts.outputs?.map(whole) ?? [];
+const rules = facts.rules ?? facts.blocks.flatMap((block) => block.rules.map((rule) => ({ ...rule, block })));
+const inputs = variables.filter((one) => !one.parts.length);
 const values = inputs.map((one) => one.start);
+const { min, max } = Math;
 
 /* --- elements, numbers and words */
 
-const node = (space, tag, look, ...parts) => {
+const node = (space, tag, look, parts) => {
   const made = document.createElementNS(`http://www.w3.org/${space}`, tag);
   for (const [name, value] of Object.entries(look)) made.setAttribute(name, value);
   made.append(...parts);
   return made;
 };
-const make = (tag, look = {}, ...parts) => node("1999/xhtml", tag, look, ...parts);
-const draw = (tag, look, ...parts) => node("2000/svg", tag, look, ...parts);
+const make = (tag, look = {}, ...parts) => node("1999/xhtml", tag, look, parts);
+const draw = (tag, look, ...parts) => node("2000/svg", tag, look, parts);
+const quiet = (...parts) => make("span", { class: "quiet" }, ...parts);
 const short = (text) => (text.length > 200 ? `${text.slice(0, 199)}…` : text);
 const named = (text) => make("bdi", {}, short(text));
-const fixed = (share) => (Number.isFinite(share) ? share.toFixed(3) : "–");
-const plain = (value) => (Number.isFinite(value) ? String(Number(value.toPrecision(6))) : "no number");
-const colour = (code) => `--k: var(--c${code % 10})`;
-const paint = (element, code) => (element.style.cssText = colour(code), element);
-const label = (code) => [paint(make("span", { class: "chip" }), code), named(classes[code])];
-const bar = () => make("span", { class: "bar", "aria-hidden": "true" }, make("span"));
-const fill = (element, share) => element.firstChild.style.setProperty("--share", share || 0);
-const day = (value) => new Date(Math.round(value * 864e5)).toISOString().slice(0, 10);
-const cell = (one, value) => {
-  if (value === null || Number.isNaN(value)) return "";
-  if (one.categories.length) return one.categories[value] ?? "";
-  return one.isDate ? day(value) : String(value);
+const button = (text, act, look = {}) => {
+  const made = make("button", { type: "button", ...look }, text);
+  made.addEventListener("click", act);
+  return made;
 };
-const shown = (one, value) =>
-  (one.categories.length || one.isDate ? cell(one, value) : plain(value)) + (one.unit ? ` ${one.unit}` : "");
-const words = (text) =>
-  text.split("\u001f").map((part, k) => (k % 2 ? make("span", { class: "word" }, part) : named(part)));
+const select = (names, look, act) => {
+  const box = make("select", look, ...names.map((name, k) => make("option", { value: k }, short(name))));
+  box.addEventListener("change", () => act(Number(box.value)));
+  return box;
+};
+const fixed = (x) => (Number.isFinite(x) ? (x > 0 && x < 0.0005 ? "<0.001" : x.toFixed(3)) : "–");
+const plain = (x, digits = 6) => (Number.isFinite(x) ? String(Number(x.toPrecision(digits))) : "no number");
+const cell = (one, x) => {
+  if (!Number.isFinite(x)) return "";
+  if (one.categories.length) return one.categories[x] ?? "";
+  return one.date ? new Date(Math.round(x * 864e5)).toISOString().slice(0, 10) : String(x);
+};
+const parsed = (one, text) => {
+  if (one.categories.length) return one.categories.includes(text) ? one.categories.indexOf(text) : NaN;
+  return one.date ? Date.parse(text) / 864e5 : parseFloat(text);
+};
+const unit = (one) => (one.unit && !one.date ? ` ${one.unit}` : "");
+const shown = (one, x) => (one.categories?.length || one.date ? cell(one, x) : plain(x)) + unit(one);
+const painted = (made, code) => { made.style.setProperty("--k", `var(--c${code % 10})`); return made; };
+const label = (code) => make("span", {}, painted(make("span", { class: "chip" }), code), named(classes[code]));
+const bar = (share) => {
+  const strip = make("span", { class: "strip", "aria-hidden": "true" }, make("span"));
+  strip.firstChild.style.width = `${100 * min(1, share || 0)}%`;
+  return strip;
+};
 
-/* --- degrees, for what is drawn and said; the model itself is `model.answer` */
+/* --- degrees, for what is drawn and said; answers come from the program alone */
 
-const least = Math.min, most = Math.max;
 const AND = {
-  minimum: least, product: (a, b) => a * b, "bounded difference": (a, b) => most(0, a + b - 1),
-  "drastic product": (a, b) => (most(a, b) === 1 ? least(a, b) : 0),
-  "einstein product": (a, b) => (a * b) / (2 - (a + b - a * b)),
-  "hamacher product": (a, b) => (a + b === 0 ? 0 : (a * b) / (a + b - a * b)),
-  "nilpotent minimum": (a, b) => (a + b > 1 ? least(a, b) : 0),
+  minimum: min, product: (a, b) => a * b, "bounded difference": (a, b) => max(0, a + b - 1),
+  "drastic product": (a, b) => (max(a, b) === 1 ? min(a, b) : 0), "nilpotent minimum": (a, b) => (a + b > 1 ? min(a, b) : 0),
+  "einstein product": (a, b) => (a * b) / (2 - (a + b - a * b)), "hamacher product": (a, b) => (a * b) / (a + b - a * b) || 0,
 };
 const OR = {
-  maximum: most, sum: (a, b) => a + b, "algebraic sum": (a, b) => a + b - a * b,
-  "bounded sum": (a, b) => least(1, a + b), "drastic sum": (a, b) => (least(a, b) === 0 ? most(a, b) : 1),
-  "einstein sum": (a, b) => (a + b) / (1 + a * b),
+  maximum: max, sum: (a, b) => a + b, "algebraic sum": (a, b) => a + b - a * b, "bounded sum": (a, b) => min(1, a + b),
+  "drastic sum": (a, b) => (min(a, b) ? 1 : max(a, b)), "nilpotent maximum": (a, b) => (a + b < 1 ? max(a, b) : 1),
+  "einstein sum": (a, b) => (a + b) / (1 + a * b), "normalized sum": (a, b) => (a + b) / max(1, a + b),
   "hamacher sum": (a, b) => (a * b === 1 ? 1 : (a + b - 2 * a * b) / (1 - a * b)),
-  "nilpotent maximum": (a, b) => (a + b < 1 ? most(a, b) : 1),
-  "normalized sum": (a, b) => (a + b) / most(1, a + b),
 };
 const HEDGE = {
-  any: () => 1, not: (d) => 1 - d, very: (d) => d * d, somewhat: Math.sqrt, cubed: (d) => d ** 3,
-  extremely: (d) => (d <= 0.5 ? 2 * d * d : 1 - 2 * (1 - d) ** 2), "very very": (d) => d ** 4,
-  seldom: (d) => (d <= 0.5 ? Math.sqrt(d / 2) : 1 - Math.sqrt((1 - d) / 2)),
+  any: () => 1, not: (d) => 1 - d, very: (d) => d * d, somewhat: Math.sqrt, cubed: (d) => d ** 3, "very very": (d) => d ** 4,
   plus: (d) => d ** 1.25, minus: (d) => d ** 0.75, "cube root": Math.cbrt,
+  extremely: (d) => (d <= 0.5 ? 2 * d * d : 1 - 2 * (1 - d) ** 2),
+  seldom: (d) => (d <= 0.5 ? Math.sqrt(d / 2) : 1 - Math.sqrt((1 - d) / 2)),
 };
-const hedged = (hedges, degree) => hedges.reduceRight((d, hedge) => HEDGE[hedge](d), degree);
-
-/* The degree of a term at a value, between its points; NaN beyond them. */
-const degree = (term, value) => {
-  if (term.at !== undefined) return Number(value === term.at);
-  const points = term.points ?? [];
-  const after = points.findIndex(([x]) => x >= value);
-  if (after < 0 || value < points[0][0]) return NaN;
-  const [[a, y], [b, z]] = [points[most(after - 1, 0)], points[after]];
-  return b > a ? y + ((value - a) / (b - a)) * (z - y) : z;
+const hedged = (hedges = [], degree) => hedges.reduceRight((d, hedge) => HEDGE[hedge](d), degree);
+const find = (all, name) => all.find((one) => one.name === name);
+const degree = ({ points = [] }, x) => { // NaN beyond the points
+  const after = points.findIndex(([place]) => place >= x);
+  if (after < 0 || x < points[0][0]) return NaN;
+  const [a, y] = points[max(after - 1, 0)], [b, z] = points[after];
+  return b > a ? y + ((x - a) / (b - a)) * (z - y) : z;
 };
-
-/* The value of each variable: what stands for a missing one, and the sums of others. */
-const known = () => {
-  let place = 0;
-  const found = variables.map((one) => {
-    if (one.parts.length) return NaN;
-    const value = values[place++];
-    return Number.isFinite(value) ? value : one.missing ?? NaN;
-  });
-  variables.forEach((one, k) => {
-    for (const [, share] of shares(one, found)) found[k] = (Number.isNaN(found[k]) ? 0 : found[k]) + share;
-    if (one.clip) found[k] = least(one.clip[1] ?? Infinity, most(one.clip[0] ?? -Infinity, found[k]));
-  });
+const shares = (one, found) => one.parts.map((part) => [part.input, part.weight * (found[part.input] - part.centre)]);
+const known = () => { // each variable's value, by its name
+  const found = Object.create(null);
+  inputs.forEach((one, k) => (found[one.name] = Number.isFinite(values[k]) ? values[k] : one.missing ?? NaN));
+  for (const one of variables) {
+    if (one.parts.length) found[one.name] = shares(one, found).reduce((sum, [, share]) => sum + share, 0);
+    if (one.clips) found[one.name] = min(one.high ?? Infinity, max(one.low ?? -Infinity, found[one.name]));
+  }
   return found;
 };
-const shares = (one, found) => one.parts.map(([part, weight, centre]) => [part, weight * (found[part] - centre)]);
-const truth = ([place, terms, hedges], found) =>
-  hedged(hedges, most(...terms.map((k) => degree(variables[place].terms[k], found[place]))));
-
-/* --- inputs */
-
-const curves = (one, high) => one.terms.filter((term) => term.points).map((term) => {
-  const at = ([x, y]) => `${(((x - one.low) / (one.high - one.low)) * 300).toFixed(1)} ${((1 - y) * high).toFixed(1)}`;
-  return draw("path", { class: "curve", d: `M${term.points.map(at).join("L")}` });
-});
-const picture = (one, high) => draw("svg", { viewBox: `0 -2 300 ${high + 4}`, preserveAspectRatio: "none", "aria-hidden": "true" },
-  draw("line", { class: "axis", x1: 0, x2: 300, y1: high, y2: high }), ...curves(one, high));
-const pin = (one, value, high) => {
-  const x = 300 * least(1, most(0, (value - one.low) / (one.high - one.low)));
-  return draw("line", { class: "pin", x1: x, x2: x, y1: -2, y2: high });
+const propositions = (when) => (!when ? [] : Array.isArray(when) ? when
+  : when.type === "is" ? [when] : (when.parts ?? [when.part]).flatMap(propositions));
+const truth = (is, found) => {
+  const one = find(variables, is.variable);
+  return one ? hedged(is.hedges, max(...(is.terms ?? []).map((term) => degree(find(one.terms, term), found[one.name])))) : NaN;
 };
-const set = (k, value) => { values[k] = value; later(); };
-
-const controls = (one, k) => {
-  const name = one.name + (one.unit ? ` in ${one.unit}` : "");
-  const parts = {};
-  if (one.categories.length) {
-    parts.box = make("select", { id: `v${k}` }, ...one.categories.map((text, place) => make("option", { value: place }, short(text))));
-    parts.box.addEventListener("change", () => set(k, Number(parts.box.value)));
-  } else {
-    parts.box = make("input", { id: `v${k}`, type: one.isDate ? "date" : "number", step: one.isDate ? 1 : "any" });
-    parts.box.addEventListener("input", () => {
-      const value = one.isDate ? Date.parse(parts.box.value) / 864e5 : parseFloat(parts.box.value);
-      if (Number.isFinite(value)) set(k, value);
-    });
-    parts.slider = make("input", { type: "range", min: one.low, max: one.high, step: one.step, "aria-label": short(name) });
-    parts.slider.addEventListener("input", () => set(k, Number(parts.slider.value)));
-  }
-  if (one.missing !== null) {
-    parts.gap = make("input", { type: "checkbox" });
-    parts.gap.addEventListener("change", () => set(k, parts.gap.checked ? NaN : one.start));
-  }
-  return parts;
+const text = (is) => [is.variable ?? is.output, "is", ...(is.hedges ?? []), (is.terms ?? [is.term]).join(" or ")].join(" ");
+const word = (said) => make("span", { class: "word" }, ` ${said} `);
+const joined = (said, parts) => parts.flatMap((part, k) => (k ? [word(said), part].flat() : part));
+const sentence = (when) => {
+  if (when.type === "is") return [named(text(when))];
+  if (when.type === "not") return [word("NOT"), "(", ...sentence(when.part), ")"];
+  const inner = (part) => (part.parts && part.type !== when.type ? ["(", ...sentence(part), ")"] : sentence(part));
+  return joined(when.type === "or" ? "OR" : "AND", (when.parts ?? when).map(inner));
 };
+const spoken = (rule) => {
+  const end = outputs.length ? joined("AND", rule.then.map((one) => [named(text(one))])) : [label(classes.indexOf(rule.then))];
+  if ((rule.weight ?? 1) !== 1) end.push(quiet(` (weight ${plain(rule.weight)})`));
+  return rule.when ? [word("IF"), ...sentence(rule.when), word("THEN"), ...end] : [word("ALWAYS"), ...end];
+};
+const order = (strengths) => strengths.map((_, k) => k).sort((a, b) => (strengths[b] || 0) - (strengths[a] || 0) || a - b);
+
+/* --- inputs: a card for each variable */
 
 const MANY = 10; // terms; of more, those of the winning rule are shown
+const across = (one, x) => 300 * ((x - one.from) / (one.to - one.from));
+const pin = (one, x, high) => draw("line", { class: "pin", x1: min(300, max(0, across(one, x))), x2: min(300, max(0, across(one, x))), y1: -2, y2: high });
+const picture = (one, high) => draw("svg", { viewBox: `0 -2 300 ${high + 4}`, preserveAspectRatio: "none", "aria-hidden": "true" },
+  draw("line", { class: "axis", x1: 0, x2: 300, y1: high, y2: high }),
+  ...one.terms.map(({ points = [] }) => draw("polyline", { class: "curve", points: points.map(([x, y]) => `${across(one, x).toFixed(1)},${(high * (1 - y)).toFixed(1)}`).join(" ") })));
+const set = (k, value) => { values[k] = value; later(); };
 const cards = variables.map((one) => {
-  const k = inputs.indexOf(one);
-  const parts = k < 0 ? {} : controls(one, k);
-  const unit = one.unit ? make("span", { class: "quiet" }, ` ${one.unit}`) : "";
-  const title = k < 0 ? make("span", {}, named(one.name)) : make("label", { for: `v${k}` }, named(one.name), unit);
-  if (k < 0) parts.sum = make("span", { class: "quiet" });
-  const gap = parts.gap ? [make("label", { class: "missing" }, parts.gap, `missing (as ${shown(one, one.missing) || "no category"})`)] : [];
-  const head = make("div", { class: "head" }, title, ...gap, parts.box ?? parts.sum);
-  parts.terms = make("ul", { class: "terms" });
-  parts.labels = one.terms.map((term) => make("li", {}, named(term.name), " ", make("span")));
-  if (one.terms.length <= MANY) parts.terms.append(...parts.labels);
-  const isDrawn = !one.categories.length && one.terms.some((term) => term.points);
-  if (isDrawn) parts.svg = picture(one, 56);
-  const pieces = [head, parts.svg, parts.slider, parts.terms].filter(Boolean);
-  $("inputs").append(make("div", { class: "card input" }, ...pieces));
-  return parts;
+  const k = inputs.indexOf(one), card = { labels: one.terms.map((term) => make("li", {}, named(term.name), " ", make("b"))) };
+  if (k < 0) card.box = quiet();
+  else if (one.categories.length) card.box = select(one.categories, { id: `v${k}` }, (place) => set(k, place));
+  else {
+    card.box = make("input", { id: `v${k}`, type: one.date ? "date" : "number", step: one.date ? 1 : "any" });
+    card.box.addEventListener("input", () => { const x = parsed(one, card.box.value); if (Number.isFinite(x)) set(k, x); });
+    card.slider = make("input", { type: "range", min: one.from, max: one.to, step: one.step, "aria-label": short(one.name) + unit(one) });
+    card.slider.addEventListener("input", () => set(k, Number(card.slider.value)));
+  }
+  const head = make("div", { class: "head" }, make(k < 0 ? "span" : "label", k < 0 ? {} : { for: `v${k}` }, named(one.name), quiet(unit(one))), card.box);
+  if (k >= 0 && one.missing !== undefined) {
+    card.gap = make("input", { type: "checkbox" });
+    card.gap.addEventListener("change", () => set(k, card.gap.checked ? NaN : one.start));
+    head.append(make("label", { class: "missing" }, card.gap, `missing (as ${shown(one, one.missing) || "no category"})`));
+  }
+  if (!one.categories.length && one.terms.some((term) => term.points)) card.svg = picture(one, 56);
+  card.terms = make("ul", { class: "terms" });
+  $("inputs").append(make("div", { class: "card input" }, ...[head, card.svg, card.slider, one.terms.length ? card.terms : null].filter(Boolean)));
+  return card;
 });
-
 const showInputs = (found, winner) => variables.forEach((one, k) => {
-  const parts = cards[k], value = found[k], place = inputs.indexOf(one);
-  if (place >= 0) {
-    const isMissing = !Number.isFinite(values[place]);
-    const text = one.categories.length ? String(values[place]) : cell(one, values[place]);
-    if (document.activeElement !== parts.box || isMissing) parts.box.value = isMissing ? "" : text;
-    parts.box.disabled = isMissing;
-    if (parts.slider) {
-      parts.slider.value = value;
-      parts.slider.disabled = isMissing;
-      parts.slider.setAttribute("aria-valuetext", isMissing ? "missing" : shown(one, value));
+  const card = cards[k], x = found[one.name], place = inputs.indexOf(one), isMissing = place >= 0 && !Number.isFinite(values[place]);
+  if (place < 0) card.box.textContent = plain(x);
+  else {
+    if (document.activeElement !== card.box || isMissing) card.box.value = isMissing ? "" : one.categories.length ? values[place] : cell(one, values[place]);
+    for (const part of [card.box, card.slider]) if (part) part.disabled = isMissing && Boolean(card.gap);
+    if (card.slider) {
+      card.slider.value = x;
+      card.slider.setAttribute("aria-valuetext", isMissing ? "missing" : shown(one, x));
     }
-    if (parts.gap) parts.gap.checked = isMissing;
-  } else parts.sum.textContent = plain(value);
-  const lines = parts.svg ? [...parts.svg.querySelectorAll(".curve")] : [];
-  const used = winner?.when.filter(([place]) => place === k).flatMap(([, terms]) => terms) ?? [];
+    if (card.gap) card.gap.checked = isMissing;
+  }
+  const used = propositions(winner?.when).filter((is) => is.variable === one.name).flatMap((is) => is.terms ?? []);
+  const isFew = one.terms.length <= MANY;
   one.terms.forEach((term, j) => {
-    const high = degree(term, value), isLit = high > 0.0005 && (one.terms.length <= MANY || used.includes(j));
-    parts.labels[j].lastChild.textContent = fixed(high);
-    parts.labels[j].classList.toggle("lit", isLit);
-    if (term.points) lines.shift()?.classList.toggle("lit", isLit);
+    const high = degree(term, x), isLit = high > 0.0005 && (isFew || used.includes(term.name));
+    card.labels[j].lastChild.textContent = fixed(high);
+    for (const part of [card.labels[j], card.svg?.children[j + 1]]) part?.classList.toggle("lit", isLit);
   });
-  if (one.terms.length > MANY) parts.terms.replaceChildren(...used.map((j) => parts.labels[j]), make("li", {}, `${one.terms.length} terms`));
-  parts.svg?.querySelector(".pin")?.remove();
-  if (Number.isFinite(value)) parts.svg?.append(pin(one, value, 56));
+  card.terms.replaceChildren(...card.labels.filter((_, j) => isFew || used.includes(one.terms[j].name)));
+  if (!isFew) card.terms.append(make("li", {}, `of ${one.terms.length} terms`));
+  card.svg?.querySelector(".pin")?.remove();
+  if (Number.isFinite(x)) card.svg?.append(pin(one, x, 56));
 });
 
 /* --- the answer */
 
 const REMARKS = ["", "a tie: the first of the strongest rules decides", "no rule fires", "a value is missing"];
-const showAnswer = (answer, degrees) => {
+const showAnswer = (answer, strengths, found) => {
   const code = classes.indexOf(answer.label);
-  const lines = outputs.length
-    ? outputs.map((one, k) => make("span", { title: String(answer.outputs[k]) },
-      named(one.name), " ", plain(answer.outputs[k]), make("small", {}, one.unit)))
-    : [make("span", {}, ...(code < 0 ? ["no class"] : label(code)), make("small", {},
-      answer.probabilities && code >= 0 ? fixed(answer.probabilities[code]) : ""))];
+  const lines = outputs.map((one, k) => make("span", { title: String(answer.outputs[k]) }, named(one.name), ` ${plain(answer.outputs[k])}`, make("small", {}, one.unit)));
+  if (!outputs.length) lines.push(make("span", {}, code < 0 ? "no class" : label(code), make("small", {}, code < 0 ? "" : fixed(answer.probabilities?.[code] ?? strengths[answer.rule - 1]))));
   if (REMARKS[answer.status]) lines.push(make("small", {}, REMARKS[answer.status]));
-  const fresh = make("output", {}, ...lines);
-  if ($("answer").textContent !== fresh.textContent) $("answer").replaceChildren(...fresh.childNodes);
-  $("shapes").replaceChildren(...(outputs.length ? outputs.map((one, k) => shape(one, k, answer)) : [bars(answer, degrees)]));
+  if ($("answer").textContent !== lines.map((line) => line.textContent).join("")) $("answer").replaceChildren(...lines);
+  $("shapes").replaceChildren(...(outputs.length ? outputs.map((one, k) => shape(one, k, answer, found)) : [bars(answer, strengths)]));
 };
-
-const bars = (answer, degrees) => {
-  const heights = answer.probabilities ?? classes.map((_, code) => most(0, ...degrees.filter((_, k) => rules[k].class === code)));
-  const ranked = classes.map((_, code) => code);
-  if (ranked.length > 12) ranked.sort((a, b) => heights[b] - heights[a]);
-  const list = ranked.slice(0, 12).map((code) => {
-    const strip = paint(bar(), code);
-    fill(strip, heights[code]);
-    return make("li", {}, make("span", {}, ...label(code)), strip, make("span", {}, fixed(heights[code])));
-  });
+const bars = (answer, strengths) => {
+  const heights = answer.probabilities ?? classes.map((name) => max(0, ...strengths.filter((_, k) => rules[k].then === name)));
+  const ranked = heights.length > 12 ? order(heights).slice(0, 12) : heights.map((_, k) => k);
+  const list = ranked.map((code) => make("li", {}, label(code), painted(bar(heights[code]), code), make("span", {}, fixed(heights[code]))));
   const caption = answer.probabilities ? "Probability of each class" : "Strongest rule of each class";
-  const more = classes.length > 12 ? `; the 12 highest of ${classes.length}` : "";
-  return make("div", {}, make("p", { class: "quiet" }, caption + more), make("ul", { class: "bars" }, ...list));
+  return make("div", {}, make("p", { class: "quiet" }, caption + (classes.length > 12 ? `; the 12 highest of ${classes.length}` : "")), make("ul", { class: "bars" }, ...list));
 };
-
-/* What the rules conclude of an output: its aggregated curve, or weighted numbers. */
-const shape = (one, place, answer) => {
-  const high = 90, svg = picture(one, high);
+const shape = (one, place, answer, found) => { // what the rules conclude of an output
+  const high = 90, svg = picture(one, high), isWeighted = one.defuzzifier.method.startsWith("weighted");
   const fired = rules.flatMap((rule, k) => {
     let strength = answer.activations[k];
-    return !(strength > 0) ? [] : rule.then.flatMap(([output, term, hedges]) => {
-      strength = hedged(hedges, strength);
-      return output === place ? [[one.terms[term], strength, AND[rule.implication]]] : [];
-    });
+    return strength > 0 ? rule.then.flatMap((end) => {
+      strength = hedged(end.hedges, strength);
+      return end.output === one.name ? [[find(one.terms, end.term), strength, AND[rule.block.implication ?? "minimum"]]] : [];
+    }) : [];
   });
-  const across = (x) => ((x - one.low) / (one.high - one.low)) * 300;
-  const row = known().filter((_, k) => variables[k].parts.length === 0);
-  const number = (term) => term.weights ? term.weights.reduce((sum, w, k) => sum + w * row[k], 0) + term.offset : term.at;
   for (const [term, strength] of fired) {
-    const x = across(number(term));
-    if (x >= 0 && x <= 300) svg.append(draw("line", { class: "stick", x1: x, x2: x, y1: high, y2: high * (1 - least(1, strength)) }, draw("title", {}, term.name)));
+    const x = across(one, term.weights ? term.weights.reduce((sum, w, k) => sum + w * found[inputs[k].name], term.offset) : term.value ?? NaN);
+    if (x >= 0 && x <= 300) svg.append(draw("line", { class: "stick", x1: x, x2: x, y1: high, y2: high * (1 - min(1, strength)) }, draw("title", {}, term.name)));
   }
-  if (!one.isWeighted && fired.some(([term]) => term.points)) {
-    const join = OR[one.aggregation], dots = [];
-    for (let k = 0; k <= 150; k += 1) {
-      const x = one.low + ((one.high - one.low) * k) / 150;
-      const y = fired.reduce((sum, [term, strength, cut]) => join(sum, cut(strength, degree(term, x) || 0)), 0);
-      dots.push(`${2 * k} ${(high * (1 - least(1, y))).toFixed(1)}`);
-    }
-    svg.append(draw("path", { class: "area", d: `M0 ${high}L${dots.join("L")}L300 ${high}z` }));
-    svg.append(draw("path", { class: "curve lit", d: `M${dots.join("L")}` }));
+  if (!isWeighted && fired.length) {
+    const join = OR[one.aggregation ?? "maximum"];
+    const dots = Array.from({ length: 151 }, (_, k) => {
+      const x = one.from + ((one.to - one.from) * k) / 150;
+      return `${2 * k},${(high * (1 - min(1, fired.reduce((sum, [term, strength, cut]) => join(sum, cut(strength, degree(term, x) || 0)), 0)))).toFixed(1)}`;
+    }).join(" ");
+    svg.append(draw("polygon", { class: "area", points: `0,${high} ${dots} 300,${high}` }), draw("polyline", { class: "curve lit", points: dots }));
   }
-  const value = answer.outputs[place];
-  if (Number.isFinite(value)) svg.append(pin(one, value, high));
-  const about = `${one.name}: ${fired.length ? one.isWeighted ? "what the rules conclude" : "aggregated conclusions" : "no conclusion"}`;
-  return make("figure", { class: "shape" }, make("figcaption", {}, named(about)), svg,
-    make("div", { class: "ends" }, make("span", {}, plain(one.low)), make("span", {}, plain(one.high))));
+  if (Number.isFinite(answer.outputs[place])) svg.append(pin(one, answer.outputs[place], high));
+  const ends = new Map(fired.map(([term, strength]) => [term.name, max(strength, ...fired.filter(([other]) => other === term).map(([, s]) => s))]));
+  const about = [...ends].sort((a, b) => b[1] - a[1]).slice(0, 4).map(([name, strength]) => `${name} ${fixed(strength)}`).join(", ") || "no rule concludes it";
+  return make("figure", { class: "shape" }, make("figcaption", {}, named(`${one.name}: ${about}`)), svg,
+    make("div", { class: "ends" }, make("span", {}, plain(one.from)), make("span", {}, plain(one.to))));
 };
 
 /* --- why */
 
-const reasons = (rule, found) => rule.when.map((one) => {
-  const [place, terms, hedges] = one, variable = variables[place], value = found[place];
-  const text = [variable.name, "is", ...hedges, terms.map((k) => variable.terms[k].name).join(" or ")].join(" ");
-  const parts = shares(variable, found).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]));
-  const sums = parts.slice(0, 3).map(([part, share]) => `${variables[part].name} ${share < 0 ? "−" : "+"}${plain(Math.abs(share))}`);
-  if (parts.length > 3) sums.push(`${parts.length - 3} more`);
-  return { text, degree: truth(one, found), value: shown(variable, value), sums: sums.join(", ") };
+const winnerOf = (answer, strengths) => (answer.rule ? answer.rule - 1 : order(strengths).find((k) => strengths[k] > 0));
+const distance = (one, is, x) => { // from the nearest cut of a term of a tree
+  const band = is.terms?.length === 1 && !is.hedges ? find(one.terms, is.terms[0]) : {};
+  if (one.categories.length || one.date) return "";
+  const [cut] = [band.low, band.high].filter((end) => end !== undefined).sort((a, b) => Math.abs(a - x) - Math.abs(b - x));
+  return cut === undefined ? "" : `, ${plain(Math.abs(x - cut), 4)} ${x > cut ? "above" : "below"} its cut ${plain(cut)}`;
+};
+const reasons = (rule, found) => propositions(rule.when).map((is) => {
+  const one = find(variables, is.variable);
+  if (!one) return { text: text(is), degree: NaN, value: "as far as it is concluded" };
+  const sums = shares(one, found).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1])).map(([name, share]) => `${name} ${share < 0 ? "−" : "+"}${plain(Math.abs(share), 4)}`);
+  const more = sums.length > 4 ? [`${sums.length - 3} more`] : [];
+  return { text: text(is), degree: truth(is, found), value: `value ${shown(one, found[one.name])}` + distance(one, is, found[one.name]),
+    sums: sums.slice(0, sums.length > 4 ? 3 : 4).concat(more).join(", ") };
 });
-const listed = (rule, found) => make("ul", {}, ...reasons(rule, found).map((one) => make("li", {}, named(one.text),
-  make("span", { class: "number" }, fixed(one.degree)), make("small", {}, `value ${one.value}${one.sums ? `: ${one.sums}` : ""}`))));
-const order = (degrees) => degrees.map((_, k) => k).sort((a, b) => (degrees[b] || 0) - (degrees[a] || 0) || a - b);
-
-const winnerOf = (answer, degrees) => answer.rule ? answer.rule - 1 : order(degrees).find((k) => degrees[k] > 0);
-
-const showWhy = (answer, degrees, found) => {
-  const ranked = order(degrees).filter((k) => degrees[k] > 0), first = winnerOf(answer, degrees);
+const showWhy = (answer, strengths, found) => {
+  const first = winnerOf(answer, strengths), ranked = order(strengths).filter((k) => strengths[k] > 0);
   if (first === undefined || answer.status === 3) {
     $("why").replaceChildren(make("p", {}, answer.status === 3 ? "A value is missing, and nothing stands for it." : "No rule fires here."));
     return;
   }
-  const next = ranked.find((k) => k !== first && (outputs.length || rules[k].class !== rules[first].class));
-  const said = outputs.length
-    ? [`Rule ${first + 1} takes part most, `, fixed(degrees[first]), `; ${ranked.length} of ${rules.length} rules fire.`]
-    : [`Rule ${first + 1} decides for `, named(classes[rules[first].class]), `: it is the strongest, ${fixed(degrees[first])}.`];
-  const parts = [make("p", {}, ...said), listed(rules[first], found)];
+  const { support, then } = rules[first], next = ranked.find((k) => k !== first && (outputs.length || rules[k].then !== then));
+  const seen = support === undefined ? "." : `; ${support} training rows reach it.`;
+  const said = outputs.length ? [`Rule ${first + 1} takes part most, ${fixed(strengths[first])}; ${ranked.length} of ${rules.length} fire.`]
+    : [`Rule ${first + 1} decides for `, named(then), ` as the strongest, ${fixed(strengths[first])}${seen}`];
+  const parts = [make("p", {}, ...said), make("ul", {}, ...reasons(rules[first], found).map((is) => make("li", {}, named(is.text),
+    make("span", {}, fixed(is.degree)), make("small", {}, named(is.value), is.sums ? named(` = ${is.sums}`) : ""))))];
   if (next !== undefined) {
-    const low = rules[next].isAny ? null : reasons(rules[next], found).reduce((a, b) => (a && !(b.degree < a.degree) ? a : b), null);
-    const whose = outputs.length ? "" : ` for ${short(classes[rules[next].class])}`;
-    const back = low ? `; what keeps it back: ${low.text} (value ${low.value}, degree ${fixed(low.degree)})` : "";
-    parts.push(make("p", { class: "quiet" }, named(`Runner-up: rule ${next + 1}${whose}, ${fixed(degrees[next])}${back}.`)));
+    const low = reasons(rules[next], found).reduce((a, b) => (a && !(b.degree < a.degree) ? a : b), null);
+    const isAll = low?.degree < 1 && !JSON.stringify(rules[next].when).includes('"type":"or"');
+    parts.push(make("p", { class: "quiet" }, `Runner-up: rule ${next + 1}`, ...(outputs.length ? [] : [" for ", named(rules[next].then)]), `, ${fixed(strengths[next])}`,
+      ...(isAll ? [", kept back by ", named(low.text), ` (${fixed(low.degree)}): `, named(low.value)] : []), "."));
   }
   $("why").replaceChildren(...parts);
 };
-
-const quoted = (text) => (/^[\w.,=@%+:/-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 const showCommand = () => {
   const row = inputs.map((one, k) => `${one.name}=${cell(one, values[k])}`).join(",");
-  $("command").textContent = `${facts.command} --row ${quoted(row)}`;
+  const quoted = /^[\w.,=@%+:/-]+$/.test(row) ? row : `'${row.replaceAll("'", "'\\''")}'`;
+  $("command").textContent = `${facts.command} --row ${quoted}`;
 };
 
 /* --- rules */
@@ -283,170 +261,133 @@ const showCommand = () => {
 const FEW = 15;
 let isSorted = rules.length > FEW, isWhole = rules.length <= FEW;
 const items = rules.map((rule, k) => {
-  const end = rule.class === undefined ? words(rule.text) : [...words(rule.text)];
-  if (rule.class !== undefined) end.splice(-1, 1, " ", ...label(rule.class));
-  const item = make("li", {}, make("span", { class: "quiet" }, `${k + 1}`), make("span", {}, ...end), bar(), make("span"));
-  return rule.class === undefined ? item : (paint(item, rule.class), item);
+  const item = make("li", {}, quiet(`${k + 1}`), make("span", {}, ...spoken(rule)), bar(0), make("span"));
+  return outputs.length ? item : painted(item, classes.indexOf(rule.then));
 });
-const showRules = (answer, degrees) => {
+const showRules = (answer, strengths) => {
   items.forEach((item, k) => {
-    fill(item.children[2], least(1, degrees[k]));
-    item.lastChild.textContent = fixed(degrees[k]);
-    item.classList.toggle("off", !(degrees[k] > 0));
+    item.children[2].replaceWith(bar(strengths[k]));
+    item.lastChild.textContent = fixed(strengths[k]);
+    item.classList.toggle("off", !(strengths[k] > 0));
     item.classList.toggle("first", answer.rule === k + 1);
   });
-  const ranked = isSorted ? order(degrees) : items.map((_, k) => k);
-  const wanted = ranked.slice(0, isWhole ? undefined : FEW).map((k) => items[k]);
-  if (wanted.some((item, k) => $("rules").children[k] !== item) || $("rules").children.length !== wanted.length) $("rules").replaceChildren(...wanted);
+  const wanted = (isSorted ? order(strengths) : items.map((_, k) => k)).slice(0, isWhole ? undefined : FEW).map((k) => items[k]);
+  const current = [...$("rules").children];
+  if (wanted.length !== current.length || wanted.some((item, k) => item !== current[k])) $("rules").replaceChildren(...wanted);
   $("sort").setAttribute("aria-pressed", isSorted);
-  $("sort").textContent = isSorted ? "In their order" : "Strongest first";
-  $("more").hidden = rules.length <= FEW;
-  $("more").setAttribute("aria-expanded", isWhole);
   $("more").textContent = isWhole ? `Show ${FEW}` : `Show all ${rules.length}`;
 };
 $("sort").addEventListener("click", () => { isSorted = !isSorted; later(); });
 $("more").addEventListener("click", () => { isWhole = !isWhole; later(); });
+$("more").hidden = rules.length <= FEW;
 
 /* --- the surface over two inputs */
 
-const choice = (title, names, start, change) => {
-  const box = make("select", {}, ...names.map((name, k) => make("option", { value: k }, short(name))));
-  box.value = start;
-  box.addEventListener("change", change);
-  $("axes").append(make("label", {}, title, box));
-  return box;
-};
+const axes = [], FINE = 64;
 let drawing = 0, drawn = "";
-const axes = [];
 const startSurface = () => {
   $("map").hidden = inputs.length < 2;
   if (inputs.length < 2) return;
-  const names = inputs.map((one) => one.name);
-  const used = [...new Set(variables.filter((one) => one.terms.length).flatMap((one) =>
-    one.parts.length ? one.parts.map(([part]) => variables[part]) : [one]))].map((one) => inputs.indexOf(one));
-  const firsts = [...used, 0, 1].filter((k, place, all) => all.indexOf(k) === place);
-  axes.push(choice("Across", names, firsts[0], () => later()), choice("Up", names, firsts[1], () => later()));
-  if (outputs.length > 1) axes.push(choice("Output", outputs.map((one) => one.name), 0, () => later()));
+  const used = variables.filter((one) => one.terms.length).flatMap((one) => (one.parts.length ? one.parts.map((part) => find(inputs, part.input)) : [one]));
+  const firsts = [...new Set([...used, ...inputs])].map((one) => inputs.indexOf(one));
+  const choose = (title, names, start) => {
+    const box = select(names, {}, () => later());
+    box.value = start;
+    $("axes").append(make("label", {}, title, box));
+    axes.push(box);
+  };
+  choose("Across", inputs.map((one) => one.name), firsts[0]);
+  choose("Up", inputs.map((one) => one.name), firsts[1]);
+  if (outputs.length > 1) choose("Output", outputs.map((one) => one.name), 0);
 };
-const cells = (one) => one.categories.length || (one.step === 1 && one.high - one.low < 64 ? one.high - one.low + 1 : 64);
-const middle = (one, k, count) => one.categories.length || count < 64 ? one.low + k : one.low + ((one.high - one.low) * (k + 0.5)) / count;
-const channels = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim().slice(1).match(/../g).map((two) => parseInt(two, 16));
-
+const cells = (one) => (one.step === 1 && one.to - one.from < FINE ? one.to - one.from + 1 : FINE); // whole numbers and categories have one each
+const middle = (one, k) => (cells(one) < FINE ? one.from + k : one.from + ((one.to - one.from) * (k + 0.5)) / FINE);
+const part = (one, x) => (cells(one) < FINE ? (x - one.from + 0.5) / cells(one) : (x - one.from) / (one.to - one.from));
+const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim().slice(1).match(/../g).map((two) => parseInt(two, 16));
 const showSurface = () => {
   if (!axes.length) return;
-  const [a, b, c] = axes.map((box) => Number(box.value));
-  const [one, two] = [inputs[a], inputs[b]], counts = [cells(one), cells(two)];
-  const part = (k, count, value) => count < 64 ? (value - k.low + 0.5) / count : (value - k.low) / (k.high - k.low);
-  const [x, y] = [part(one, counts[0], values[a]), part(two, counts[1], values[b])];
+  const [a, b, output = 0] = axes.map((box) => Number(box.value));
+  const [x, y] = [a, b].map((k) => part(inputs[k], values[k]));
   $("here").hidden = !(x >= 0 && x <= 1 && y >= 0 && y <= 1);
   $("here").style.left = `${100 * x}%`;
-  $("here").style.top = `${100 * (1 - y)}%`;
-  const others = values.map((value, k) => (k === a || k === b ? "" : value)).join();
-  const isDark = matchMedia("(prefers-color-scheme: dark)").matches;
-  const state = [a, b, c, others, isDark].join("|");
-  if (state === drawn) return;
+  $("here").style.top = `${100 - 100 * y}%`;
+  const state = [a, b, output, ...values.filter((_, k) => k !== a && k !== b), ink("--page")].join();
+  if (state !== drawn) sweep(a, b, output, ++drawing);
   drawn = state;
-  sweep(a, b, c ?? 0, counts, ++drawing);
 };
-
-const sweep = (a, b, output, [wide, high], turn) => {
-  const canvas = $("canvas"), row = values.slice();
+const sweep = (a, b, output, turn) => { // row after row, so that the page stays quick
+  const canvas = $("canvas"), row = values.slice(), wide = cells(inputs[a]), high = cells(inputs[b]);
   const numbers = new Float64Array(wide * high).fill(NaN), codes = new Int32Array(wide * high).fill(-1);
   [canvas.width, canvas.height] = [wide, high];
-  canvas.style.imageRendering = least(wide, high) < 64 ? "pixelated" : "auto";
-  canvas.setAttribute("aria-label", `${outputs.length ? outputs[output].name : "class"} over ${inputs[a].name} (across) and ${inputs[b].name} (up)`);
+  canvas.style.imageRendering = min(wide, high) < FINE ? "pixelated" : "auto";
+  canvas.setAttribute("aria-label", `${outputs[output]?.name ?? "class"} over ${inputs[a].name} (across) and ${inputs[b].name} (up)`);
   let line = 0;
   const step = () => {
     if (turn !== drawing) return;
-    const end = performance.now() + 14;
-    while (line < high && performance.now() < end) {
-      row[b] = middle(inputs[b], high - 1 - line, high);
-      for (let k = 0; k < wide; k += 1) {
-        row[a] = middle(inputs[a], k, wide);
-        const answer = model.answer(row), place = line * wide + k;
+    for (const end = performance.now() + 12; line < high && performance.now() < end; line += 1) {
+      row[b] = middle(inputs[b], high - 1 - line);
+      for (let k = 0, place = line * wide; k < wide; k += 1, place += 1) {
+        row[a] = middle(inputs[a], k);
+        const answer = model.answer(row);
         codes[place] = outputs.length ? 0 : classes.indexOf(answer.label);
-        numbers[place] = outputs.length ? answer.outputs[output]
-          : answer.probabilities?.[codes[place]] ?? (answer.rule ? answer.strengths[answer.rule - 1] : NaN);
+        numbers[place] = outputs.length ? answer.outputs[output] : answer.probabilities?.[codes[place]] ?? answer.strengths[answer.rule - 1];
       }
-      line += 1;
     }
-    colourSurface(canvas, numbers, codes, output);
+    colour(canvas, numbers, codes, outputs[output]);
     if (line < high) requestAnimationFrame(step);
   };
   step();
 };
-
-const colourSurface = (canvas, numbers, codes, output) => {
+const colour = (canvas, numbers, codes, output) => {
   const context = canvas.getContext("2d"), image = context.createImageData(canvas.width, canvas.height);
-  const finite = numbers.filter(Number.isFinite);
-  const [low, high] = finite.length ? [finite.reduce((x, y) => least(x, y)), finite.reduce((x, y) => most(x, y))] : [0, 1];
-  const soft = channels("--soft"), inks = outputs.length ? [channels("--link")] : classes.map((_, k) => channels(`--c${k % 10}`));
-  numbers.forEach((value, k) => {
-    if (codes[k] < 0 || Number.isNaN(value)) return;
-    const share = outputs.length ? (high > low ? (value - low) / (high - low) : 0.5) : 0.2 + 0.8 * most(0, value) ** 1.5;
-    inks[codes[k]].forEach((ink, j) => (image.data[4 * k + j] = soft[j] + (ink - soft[j]) * share));
+  const low = numbers.reduce((a, b) => (b < a ? b : a), Infinity), high = numbers.reduce((a, b) => (b > a ? b : a), -Infinity);
+  const soft = ink("--soft"), inks = output ? [ink("--link")] : classes.map((_, k) => ink(`--c${k % 10}`));
+  numbers.forEach((x, k) => {
+    if (codes[k] < 0 || Number.isNaN(x)) return;
+    const share = output ? (high > low ? (x - low) / (high - low) : 0.5) : 0.2 + 0.8 * x ** 1.5;
+    inks[codes[k]].forEach((full, j) => (image.data[4 * k + j] = soft[j] + (full - soft[j]) * share));
     image.data[4 * k + 3] = 255;
   });
   context.putImageData(image, 0, 0);
   const seen = [...new Set(codes)].filter((code) => code >= 0).sort((x, y) => x - y);
-  $("legend").replaceChildren(...(outputs.length
-    ? [make("span", {}, plain(low)), make("span", { class: "ramp" }), make("span", {}, plain(high)), make("span", { class: "quiet" }, named(outputs[output].name))]
-    : seen.slice(0, 30).map((code) => make("span", {}, ...label(code)))));
+  $("legend").replaceChildren(...(output ? [plain(low), make("span", { class: "ramp" }), plain(high), quiet(named(output.name))] : seen.slice(0, 30).map(label)));
 };
 $("plot").addEventListener("click", (event) => {
   const box = $("canvas").getBoundingClientRect();
-  const shares = [(event.clientX - box.left) / box.width, 1 - (event.clientY - box.top) / box.height];
-  shares.forEach((share, j) => {
-    const k = Number(axes[j].value), one = inputs[k], count = cells(one);
-    const raw = count < 64 ? one.low + Math.floor(share * count) : one.low + share * (one.high - one.low);
-    values[k] = least(one.high, most(one.low, Number((Math.round(raw / one.step) * one.step).toPrecision(12))));
+  [(event.clientX - box.left) / box.width, 1 - (event.clientY - box.top) / box.height].forEach((share, j) => {
+    const k = Number(axes[j].value), one = inputs[k];
+    const x = cells(one) < FINE ? one.from + Math.floor(share * cells(one)) : one.from + share * (one.to - one.from);
+    set(k, min(one.to, max(one.from, Number((Math.round(x / one.step) * one.step).toPrecision(12)))));
   });
-  later();
 });
 
 /* --- rows of the table, the address, and the loop */
 
-const showRow = (k) => { facts.rows[k].forEach((value, j) => (values[j] = value ?? NaN)); later(); };
 const startRows = () => {
-  const count = facts.rows.length, buttons = $("rows");
-  const reset = make("button", { type: "button" }, "Reset");
-  reset.addEventListener("click", () => { inputs.forEach((one, k) => (values[k] = one.start)); later(); });
-  if (count) {
-    const box = make("input", { type: "number", min: 1, max: count, value: 1, "aria-label": "Row of the table" });
-    const move = (by) => { box.value = least(count, most(1, (parseInt(box.value, 10) || 1) + by)); showRow(box.value - 1); };
-    const turn = (text, by, title) => {
-      const button = make("button", { type: "button", "aria-label": title }, text);
-      button.addEventListener("click", () => move(by));
-      return button;
-    };
-    box.addEventListener("change", () => move(0));
-    const of = count < facts.total ? `of the first ${count} of ${facts.total} rows` : `of ${count} rows`;
-    buttons.append(make("span", { class: "quiet" }, "Row"), turn("‹", -1, "Row before"), box, turn("›", 1, "Next row"), make("span", { class: "quiet" }, of));
-  }
-  buttons.append(reset);
+  const box = make("input", { type: "number", min: 1, max: rows.length, value: 1, "aria-label": "Row of the table" });
+  const move = (by) => {
+    box.value = min(rows.length, max(1, (parseInt(box.value, 10) || 1) + by));
+    rows[box.value - 1].forEach((x, k) => set(k, x ?? NaN));
+  };
+  box.addEventListener("change", () => move(0));
+  const of = rows.length < facts.total ? `of the first ${rows.length} of ${facts.total} rows` : `of ${rows.length} rows`;
+  if (rows.length) $("rows").append(quiet("Row"), button("‹", () => move(-1), { "aria-label": "Row before" }), box, button("›", () => move(1), { "aria-label": "Next row" }), quiet(of));
+  $("rows").append(button("Reset", () => inputs.forEach((one, k) => set(k, one.start))));
 };
-
 const readAddress = () => {
   const row = new URLSearchParams(location.hash.slice(1));
-  inputs.forEach((one, k) => {
-    const text = row.get(one.name);
-    if (text === null) return;
-    const place = one.categories.indexOf(text);
-    const number = one.isDate ? Date.parse(text) / 864e5 : text.trim() ? Number(text) : NaN;
-    values[k] = one.categories.length ? (place < 0 ? NaN : place) : Number.isFinite(number) ? number : NaN;
-  });
+  inputs.forEach((one, k) => { if (row.has(one.name)) values[k] = parsed(one, row.get(one.name)); });
 };
 const writeAddress = () => {
   const row = new URLSearchParams(inputs.map((one, k) => [one.name, cell(one, values[k])]));
   try { history.replaceState(null, "", `#${row}`); } catch { /* a frame without an address */ }
 };
-
 const update = () => {
-  const answer = model.answer(values), degrees = answer.strengths ?? answer.activations, found = known();
-  showInputs(found, rules[winnerOf(answer, degrees)]);
-  showAnswer(answer, degrees);
-  showWhy(answer, degrees, found);
-  showRules(answer, degrees);
+  const answer = model.answer(values), strengths = answer.strengths ?? answer.activations, found = known();
+  showInputs(found, rules[winnerOf(answer, strengths)]);
+  showAnswer(answer, strengths, found);
+  showWhy(answer, strengths, found);
+  showRules(answer, strengths);
   showCommand();
   showSurface();
 };
@@ -456,7 +397,6 @@ const later = () => {
   clearTimeout(writing);
   writing = setTimeout(writeAddress, 250);
 };
-
 $("copy").addEventListener("click", async () => {
   getSelection().selectAllChildren($("command"));
   try { await navigator.clipboard.writeText($("command").textContent); } catch { document.execCommand("copy"); }
@@ -467,8 +407,9 @@ addEventListener("hashchange", () => { readAddress(); later(); });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", later);
 const wrong = model.selfTest();
 $("warning").hidden = !wrong.length;
-$("warning").textContent = wrong.length ? `This browser computes other numbers than fuzzytree: ${wrong[0].slice(0, 300)}` : "";
-$("checked").textContent = wrong.length ? "" : `The program in this page is that of \`fuzzytree export --to javascript\`; its self-test passed here. Fingerprint ${facts.fingerprint.slice(0, 12)}.`;
+$("warning").textContent = `This browser computes other numbers than fuzzytree: ${wrong[0]?.slice(0, 300)}`;
+$("checked").textContent = wrong.length ? "" : `Its program is that of fuzzytree export --to javascript; the self-test passed in this browser. Fingerprint ${facts.fingerprint.slice(0, 12)}.`;
+$("proof").hidden = !inputs.length;
 startRows();
 startSurface();
 readAddress();
