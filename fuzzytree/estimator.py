@@ -31,7 +31,7 @@ from fuzzytree.model import (
     leaf_paths,
     with_label_type,
 )
-from fuzzytree.report import Picture, draw_tree
+from fuzzytree.report import Picture, draw_model
 from fuzzytree.runtimes import baseline, class_probabilities
 from fuzzytree.semantics import Status, rules_from_tree
 from fuzzytree.tables import TableSource, batches, read_table
@@ -521,13 +521,23 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         )
         return ways[rules - 1]
 
-    def plot(self, *, title: str | None = None) -> Picture:
-        """Return a picture, which a notebook shows; `picture.save` writes it.
+    def plot(
+        self,
+        *,
+        title: str | None = None,
+        row: Mapping[str, float | str] | None = None,
+        surface: Sequence[str] | None = None,
+    ) -> Picture:
+        """Return a picture of the tree, or of a row or two columns, as `draw` does.
+
+        A notebook shows it; `picture.save` writes it.
 
         Raises:
-            ValueError: If the tree is too large for a picture.
+            ValueError: If the tree is too large for a picture, the row does not fit, or
+                there is no such surface.
         """
-        return draw_tree(self.__fuzzytree__(), title=title)
+        tree = self.__fuzzytree__()
+        return draw_model(tree, title=title, row=row, surface=surface)
 
     def __fuzzytree__(self) -> FuzzyTree:
         """Return the tree, so that every function of fuzzytree takes the classifier.

@@ -491,6 +491,10 @@ def test_a_classifier_draws_and_prints_its_tree() -> None:
     model = FuzzyTreeClassifier(leaves=3).fit(WINE.data, WINE.target)
     assert model.plot() == ft.draw(model.tree_)
     assert ">three classes<" in model.plot(title="three classes").svg
+    row = dict.fromkeys(model.tree_.inputs, 1.0)
+    assert model.plot(row=row) == ft.draw(model, row=row)
+    two = model.tree_.inputs[:2]
+    assert model.plot(surface=two) == ft.draw(model, surface=two)
     text = ft.export_text(model)
     assert text == ft.export_text(model.tree_)
     assert text.splitlines()[0].startswith("tree: fuzzy tree, 2 nodes, 3 leaves")

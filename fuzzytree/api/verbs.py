@@ -275,7 +275,12 @@ def rules_from_tree(
         TypeError: If it is no tree.
         InvalidModelError: If `kind` is `raw` and the tree carries no sets.
     """
-    result = _tree_of(tree, "rules_from_tree")
+    result = checking.as_model(tree)
+    if not isinstance(result, FuzzyTree):
+        called = checking.CALLED[kind_of(result)]
+        raise TypeError(
+            f"rules_from_tree takes a tree, and {result.name} is a {called}"
+        )
     return semantics.rules_from_tree(result, kind, conjunction=conjunction)
 
 
@@ -518,14 +523,6 @@ def _model_of(model: ModelSource, verb: str) -> Model:
             f"{verb} takes a tree or a rule base"
         )
     return cast("Model", decider)
-
-
-def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:
-    result = checking.as_model(model)
-    if not isinstance(result, FuzzyTree):
-        kind = checking.CALLED[kind_of(result)]
-        raise TypeError(f"{verb} takes a tree, and {result.name} is a {kind}")
-    return result
 
 
 def audit(
@@ -971,21 +968,42 @@ def _recheck_conversion(audit: str, path: str, solver: str) -> Report | None:
         raise ReadError(str(error)) from error
 
 
-def draw(tree: ModelSource, *, title: str | None = None) -> Picture:
-    """Draw a tree: its nodes, the terms of its branches, its classes.
+def draw(
+    model: ModelSource,
+    *,
+    title: str | None = None,
+    row: Mapping[str, float | str] | None = None,
+    surface: Sequence[str] | None = None,
+) -> Picture:
+    """Draw a tree, the terms of a model, its rules for a row, or a surface.
 
     Args:
-        tree: A tree, a fitted classifier, or the path of a file that holds a tree.
-        title: Above the picture; the name and size of the tree unless given.
+        model: A tree, a fitted classifier, a rule base or a fuzzy system, or the path
+            of one. A tree is drawn with the terms of its branches and the rows of each
+            box; of the others the terms of all variables are drawn.
+        title: Above the picture; the name of the model unless given.
+        row: The value of each input, a text in the words of the table: what each rule
+            makes of the row is drawn.
+        surface: Two inputs of numbers: the class or the outputs over both. Other inputs
+            have the values of `row`, where it has them, or else what stands for missing
+            values, or the middle of their ranges, as the picture says.
 
     Returns:
         A picture, which a notebook shows; `picture.save("tree.svg")` writes it.
 
     Raises:
-        TypeError: If it is no tree.
-        ValueError: If the tree is too large for a picture.
+        ReadError: If the file cannot be read.
+        ValueError: If the model is too large for a picture, the row does not fit, or
+            there is no such surface.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1, leaves=2)
+        >>> "strength 1:" in draw(tree, row=dict.fromkeys(tree.inputs, 0.0)).svg
+        True
     """
-    return report.draw_tree(_tree_of(tree, "draw"), title=title)
+    document = checking.as_model(model)
+    return report.draw_model(document, title=title, row=row, surface=surface)
 
 
 def export_text(model: ModelSource) -> str:

@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fuzzytree.cli.audit_options import row_of
 from fuzzytree.cli.console import (
     ResultOptions,
     answer,
     answer_json,
     model_argument,
+    option,
     output_option,
     say,
     takes,
@@ -29,6 +31,13 @@ class ShowOptions(ResultOptions):
         "--picture FILE",
         "Picture of the tree, or of the terms of rules, as .svg or .png.",
     )
+    row: str | None = option(
+        "--row NAME=VALUE,...", "Row for which the picture shows each rule."
+    )
+    surface: str | None = option(
+        "--surface NAME,NAME",
+        "Two inputs over which the picture shows the class or the outputs.",
+    )
 
 
 @click.command("show", short_help="Show a model and its rules.")
@@ -46,6 +55,11 @@ def command(options: ShowOptions) -> None:
     from fuzzytree.model import FuzzySystem, loss_text
     from fuzzytree.runtimes import OnnxModel
 
+    for flag, value in (("--row", options.row), ("--surface", options.surface)):
+        if value is not None and options.picture is None:
+            raise click.UsageError(
+                f"{flag} {value}: is drawn, and needs --picture FILE"
+            )
     if Path(options.model).suffix.lower() == ".onnx":
         if options.picture is not None:
             raise click.UsageError(
@@ -63,7 +77,7 @@ def command(options: ShowOptions) -> None:
     model = found.model
     coverage = coverage_of(model) if isinstance(model, FuzzySystem) else None
     if options.picture is not None:
-        _draw(model, options.picture)
+        _draw(model, options, options.picture)
         say(f"wrote    {options.picture}", quiet=options.quiet)
     for loss in found.losses:
         say(f"lost     {loss_text(loss)}")
@@ -75,12 +89,13 @@ def command(options: ShowOptions) -> None:
         answer("\n".join(report.model_lines(model)))
 
 
-def _draw(model: Document, picture: str) -> None:
-    from fuzzytree import report
+def _draw(model: Document, options: ShowOptions, path: str) -> None:
+    from fuzzytree import api
 
+    surface = None if options.surface is None else options.surface.split(",")
+    names = None if surface is None else [name.strip() for name in surface]
     with wrong_options():
-        draw = report.draw_tree if model.leaves else report.draw_terms
-        draw(model).save(picture)
+        api.draw(model, row=row_of(options.row), surface=names).save(path)
 
 
 def _facts(found: Reading) -> dict[str, object]:

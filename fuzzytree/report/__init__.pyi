@@ -38,8 +38,7 @@ from .stability import stability_lines as stability_lines
 from .svg_bench import work_precision as work_precision
 from .svg_front import draw_front as draw_front
 from .svg_reliability import draw_reliability as draw_reliability
-from .svg_terms import draw_terms as draw_terms
-from .svg_tree import draw_tree as draw_tree
+from .svg_surface import draw_model as draw_model
 from .text import agreement_lines as agreement_lines
 from .text import agreement_verdict as agreement_verdict
 from .text import aligned as aligned

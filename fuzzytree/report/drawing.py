@@ -222,7 +222,8 @@ def _is_between(
     a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
 ) -> bool:
     across = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    return abs(across) <= _FLAT * max(math.dist(a, c), _FLAT)
+    least = max(math.dist(a, c), _FLAT)
+    return abs(across) <= _FLAT * least and math.dist(a, b) <= least
 
 
 def path_of(dots: Sequence[tuple[float, float]]) -> Markup:

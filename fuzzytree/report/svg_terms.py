@@ -8,20 +8,20 @@ from typing import NamedTuple
 import numpy as np
 
 from fuzzytree.auditing import Span
-from fuzzytree.model import Document, SystemOutput, Variable
+from fuzzytree.model import Document, SystemOutput, Variable, printable
 from fuzzytree.report.audit_rows import Data, histogram
 from fuzzytree.report.drawing import (
-    LETTER,
     Axis,
     Curve,
     Scale,
     axis_marks,
     axis_of,
     between,
-    cut,
     lines_within,
     polyline,
     spread,
+    text_width,
+    word_lines,
 )
 from fuzzytree.report.markup import Markup, mark
 from fuzzytree.report.models import summands
@@ -29,7 +29,7 @@ from fuzzytree.report.pictures import Picture, class_mark, picture
 from fuzzytree.report.text import number
 
 WIDE = 340.0
-MOST_CURVES = 24
+MOST_CURVES = 60
 """Of one variable that are drawn."""
 
 DASHES = (None, "7 3", "2 2.5", "9 3 2 3")
@@ -43,16 +43,7 @@ _BINS = 36
 _FONT = 11.0
 _ACROSS = 3  # variables beside each other in a picture of their own
 _GAP, _LINE = 12.0, 16.0
-_PANEL = 8.0 + _ROW * _MOST_ROWS + _PLOT + 22.0  # at most, of one variable
-_SMALL = 10.5  # the size of small words
-_STYLE = """
-svg .term { font-size: 11px; }
-.curve { fill: none; stroke: #1b1c1e; stroke-width: 1.7; stroke-linejoin: round; }
-.axis, .tick { stroke: #595d66; }
-.lead { stroke: #c9ccd3; }
-.outside { fill: #eceef2; }
-.domain { stroke: #595d66; stroke-dasharray: 1 3; stroke-width: 1.5; }
-"""
+_SMALL, _STRONG = 10.5, 14.0  # sizes of words
 
 
 def scale_of(axis: Axis, data: Data | None) -> Scale:
@@ -87,44 +78,66 @@ def terms_picture(
         value: A point, which is marked.
         named: The terms that a finding is about; the others are faint.
     """
+    marks, high = _terms_marks(axis, data, span, value, named)
+    return _svg(axis, marks, high, name)
+
+
+def _terms_marks(
+    axis: Axis,
+    data: Data | None,
+    span: Span | None = None,
+    value: float | None = None,
+    named: Collection[str] | None = None,
+    *,
+    has_colours: bool = False,
+) -> tuple[list[Markup], float]:
+    """Return the marks of a picture of terms, and how high it is."""
     x = scale_of(axis, data)
-    drawn = axis.curves[:MOST_CURVES]
-    names = _placed(drawn, x)
+    curves = axis.curves[:MOST_CURVES]
+    names, listing = _names_of(curves, x)
     top = 8.0 + _ROW * max((name.row + 1 for name in names), default=0)
     y = Scale(0.0, 1.0, top + _PLOT, top)
-    parts = [*_bins(axis, data, x, y)]
-    parts += outside(axis, x, top - 4, y.start)
+    marks = [*_bins(axis, data, x, y)]
+    marks += outside(axis, x, top - 4, y.start)
     if span is not None:
         start, end = _ends(span, x)
-        parts.append(
+        marks.append(
             mark("rect", start, top - 4, end - start, y.start - top + 4, "region")
         )
-    parts.append(mark("line", _LEFT, _RIGHT, y.start, y.start, "axis"))
-    parts += _curves(drawn, x, y, named)
-    parts += _names(names, top)
+    marks.append(mark("line", _LEFT, _RIGHT, y.start, y.start, "axis"))
+    marks += _curves(curves, x, y, named, has_colours=has_colours)
+    marks += _name_marks(names, top, has_colours=has_colours)
     if value is not None:
         at = x.at(value)
-        parts.append(mark("line", at, at, top - 4, y.start, "pin"))
+        marks.append(mark("line", at, at, top - 4, y.start, "pin"))
         diamond = f"M{at:.1f} {y.start - 5.5:.1f}l5.5 5.5l-5.5 5.5l-5.5 -5.5z"
-        parts.append(mark("path", diamond, "witness"))
-    if len(names) < len(axis.curves):
-        said = f"+ {len(drawn) - len(names)} unnamed"
-        if len(drawn) < len(axis.curves):
-            said += f", {len(axis.curves) - len(drawn)} not drawn"
-        parts.append(mark("words", x.end, top + 10.0, said, "small", "end"))
-    parts += axis_marks(x, y.start)
-    high = y.start + 22.0
-    title = f"The terms of {axis.title}"
-    terms = ", ".join(curve.name for curve in drawn) or "none"
+        marks.append(mark("path", diamond, "witness"))
+    marks += axis_marks(x, y.start)
+    rest = len(axis.curves) - len(curves)
+    listing += [f"{rest} not drawn"] if rest else []
+    lines = lines_within(listing, WIDE - 2 * _LEFT, _SMALL)
+    marks += word_lines(_LEFT, y.start + 32.0, lines, "small", _ROW)
+    return marks, y.start + 22.0 + _ROW * len(lines)
+
+
+def _svg(axis: Axis, marks: list[Markup], high: float, name: str) -> Markup:
+    terms = ", ".join(curve.name for curve in axis.curves[:MOST_CURVES]) or "none"
     domain = ""
     if axis.low is not None and axis.high is not None:
         domain = f"; the domain is {number(axis.low)} to {number(axis.high)}"
     about = f"Degrees from 0 to 1 over the values{domain}; terms: {terms}"
-    return mark("svg", WIDE, high, name, title, about, parts)
+    return mark("svg", WIDE, high, name, f"The terms of {axis.title}", about, marks)
 
 
-def draw_terms(model: Document) -> Picture:
+def draw_terms(model: Document, *, title: str | None = None) -> Picture:
     """Draw the terms of each variable of a model, and those of a system's outputs.
+
+    Where names of terms do not fit above their curves, numbers stand there, and the
+    names below.
+
+    Args:
+        model: The model.
+        title: Above the picture; by default the model's name.
 
     Raises:
         ValueError: If the model has no terms that are curves.
@@ -134,31 +147,35 @@ def draw_terms(model: Document) -> Picture:
         >>> draw_terms(random_system(2)).svg.startswith("<svg")
         True
     """
-    marks: list[Markup] = []
-    left = high = top = wide = 0.0
     variables: list[Variable | SystemOutput] = [*model.variables, *model.outputs]
-    for axis, variable in zip(map(axis_of, variables), variables, strict=True):
-        if not (axis.curves or axis.undrawn):
-            continue
-        notes = [axis.title, *_note_lines(variable, axis)]
-        drawn = terms_picture(axis, None, f"v{len(marks)}")
-        words = [
-            mark("words", 0.0, _LINE * k, note, "small" if k > 1 else "strong")
-            for k, note in enumerate(notes, 1)
-        ]
-        below = _LINE * (len(notes) + 0.5)
-        if axis.curves:
-            words.append(mark("group", [drawn], move=f"translate(0 {below:.1f})"))
-        move = f"translate({left + _GAP:.0f} {top + _GAP:.0f})"
-        marks.append(mark("group", words, move=move))
-        high = max(high, top + below + _PANEL)
-        wide = max(wide, left + WIDE + 2 * _GAP)
-        left += WIDE + 2 * _GAP
-        if left >= _ACROSS * (WIDE + 2 * _GAP):
-            left, top = 0.0, high
-    if not marks:
+    axes = [*zip(map(axis_of, variables), variables, strict=True)]
+    axes = [(axis, own) for axis, own in axes if axis.curves or axis.undrawn]
+    if not axes:
         raise ValueError(f"{model.name} has no terms that are curves")
-    return picture(marks, wide, high + _GAP, f"The terms of {model.name}", _STYLE)
+    heading = f"The terms of {model.name}" if title is None else title
+    step = WIDE + 2 * _GAP
+    wide = step * min(len(axes), _ACROSS)
+    lines = lines_within(heading, wide - 2 * _GAP, _STRONG)
+    marks = [*word_lines(_GAP, 20.0, lines, "strong", 17.0)]
+    top = high = 17.0 * len(lines) + 8.0
+    for place, (axis, variable) in enumerate(axes):
+        column = place % _ACROSS
+        top = high if not column else top
+        names = lines_within(axis.title, WIDE, _STRONG)
+        notes = [*_note_lines(variable, axis)]
+        card = [*word_lines(0.0, _LINE, names, "strong", _LINE)]
+        below = _LINE * len(names)
+        card += word_lines(0.0, below + _LINE, notes, "small", _LINE)
+        below += _LINE * (len(notes) + 0.5)
+        if axis.curves:
+            inner, size = _terms_marks(axis, None, has_colours=True)
+            picture_of = _svg(axis, inner, size, f"v{place}")
+            card.append(mark("group", [picture_of], move=f"translate(0 {below:.1f})"))
+            below += size
+        move = f"translate({column * step + _GAP:.0f} {top + _GAP:.1f})"
+        marks.append(mark("group", card, move=move))
+        high = max(high, top + below + 2 * _GAP)
+    return picture(marks, wide, high, heading)
 
 
 def _note_lines(variable: Variable | SystemOutput, axis: Axis) -> Iterator[str]:
@@ -182,12 +199,18 @@ def sum_lines(variable: Variable | SystemOutput, wide: float, size: float) -> li
 
 
 def _curves(
-    curves: Sequence[Curve], x: Scale, y: Scale, named: Collection[str] | None = None
+    curves: Sequence[Curve],
+    x: Scale,
+    y: Scale,
+    named: Collection[str] | None,
+    *,
+    has_colours: bool,
 ) -> Iterator[Markup]:
     """Yield the curves of terms; all but those that are named, if any, are faint."""
     for place, curve in enumerate(curves):
         is_faint = bool(named) and curve.name not in (named or ())
         look = "curve faint" if is_faint else "curve"
+        look += f" {class_mark(place)}" if has_colours else ""
         dashes = DASHES[place % len(DASHES)]
         yield mark("curve", curve.name, polyline(curve, x, y), look, dashes)
 
@@ -224,35 +247,55 @@ def _bins(axis: Axis, data: Data | None, x: Scale, y: Scale) -> Iterator[Markup]
 
 
 class _Name(NamedTuple):
-    """The name of a term above its curve; row 0 stands lowest."""
+    """The name of a term above its curve, or its number; row 0 stands lowest."""
 
-    said: str
+    text: str
     middle: float
     row: int
+    place: int
 
 
-def _placed(curves: Sequence[Curve], x: Scale) -> list[_Name]:
-    """Return the names that fit above the plateaus, from left to right."""
-    free = [x.start - 9.0] * _MOST_ROWS
+def _names_of(curves: Sequence[Curve], x: Scale) -> tuple[list[_Name], list[str]]:
+    """Return names above the plateaus, from left to right, or numbers and their names.
+
+    Names stand in a few rows; where they do not fit, each has a number.
+    """
+    middles = sorted((_top(curve, x), k) for k, curve in enumerate(curves))
+    names = _rows_of([(curves[k].name, top, k) for top, k in middles], x)
+    if max((name.row for name in names), default=0) < _MOST_ROWS:
+        return names, []
+    order = [k for _, k in middles]
+    numbers = [(str(n), top, k) for n, (top, k) in enumerate(middles, 1)]
+    listing = [f"{n} {curves[k].name}" for n, k in enumerate(order, 1)]
+    return _rows_of(numbers, x), [f"{text}," for text in listing[:-1]] + listing[-1:]
+
+
+def _rows_of(texts: Sequence[tuple[str, float, int]], x: Scale) -> list[_Name]:
+    """Return texts near their places, each in the lowest row where it has room."""
+    ends: list[float] = []
     names: list[_Name] = []
-    for top, place in sorted((_top(curve, x), k) for k, curve in enumerate(curves)):
-        said = cut(curves[place].name, 22)
-        half = LETTER * _FONT * len(said) / 2.0
-        middle = min(max(top, x.start + half), x.end - half)
-        rows = (row for row, end in enumerate(free) if end + 8.0 <= middle - half)
-        row = next(rows, None)
-        if row is not None:
-            free[row] = middle + half
-            names.append(_Name(said, middle, row))
+    for text, top, place in texts:
+        half = text_width(printable(text), _FONT) / 2.0
+        middle = max(min(top, x.end - half), x.start + half)
+        is_long = half > (x.end - x.start) / 2.0
+        free = (k for k, end in enumerate(ends) if end + 6.0 <= middle - half)
+        row = _MOST_ROWS if is_long else next(free, len(ends))
+        ends += [0.0] * (row + 1 - len(ends))
+        ends[row] = middle + half
+        names.append(_Name(text, middle, row, place))
     return names
 
 
-def _names(names: Sequence[_Name], top: float) -> Iterator[Markup]:
-    for said, middle, row in names:
-        base = top - 9.0 - _ROW * row
-        if row:
-            yield mark("line", middle, middle, base + 3, top - 4, "lead")
-        yield mark("words", middle, base, said, "term", "middle")
+def _name_marks(
+    names: Sequence[_Name], top: float, *, has_colours: bool
+) -> Iterator[Markup]:
+    bases = [top - 9.0 - _ROW * name.row for name in names]
+    for name, base in zip(names, bases, strict=True):
+        if name.row:
+            yield mark("line", name.middle, name.middle, base + 3, top - 4, "lead")
+    for name, base in zip(names, bases, strict=True):
+        own = f" {class_mark(name.place)}" if has_colours else ""
+        yield mark("words", name.middle, base, name.text, f"name{own}", "middle")
 
 
 def _top(curve: Curve, x: Scale) -> float:

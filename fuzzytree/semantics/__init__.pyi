@@ -40,10 +40,14 @@ from .enclosing import Interval as Interval
 from .enclosing import Jet as Jet
 from .enclosing import degree_bounds as degree_bounds
 from .enclosing import jet as jet
+from .inference import Consequent as Consequent
 from .inference import answer_of as answer_of
+from .inference import consequents as consequents
 from .inference import infer as infer
+from .inference import input_values as input_values
 from .inference import unsampled_terms as unsampled_terms
 from .inference.degrees import curve_degree as curve_degree
+from .inference.degrees import hedged as hedged
 from .inference.degrees import value_at as value_at
 from .lowering import Form as Form
 from .lowering import forms as forms

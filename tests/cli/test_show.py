@@ -164,6 +164,52 @@ def test_a_picture_of_a_system_shows_its_outputs_too(call: Call) -> None:
         assert f">The terms of {output.name}" in drawn
 
 
+def test_a_picture_of_a_row_or_a_surface_is_that_of_python(call: Call) -> None:
+    row = ("--row", "force=3,slip=1")
+    code, _, err = call("show", "rules.yaml", "--picture", "row.svg", *row)
+    assert (code, err) == (0, "wrote    row.svg\n")
+    picture = ft.draw("rules.yaml", row={"force": 3.0, "slip": 1.0})
+    assert Path("row.svg").read_text("utf-8") == picture.svg
+    system = random_system(2)
+    ft.save(system, "system.yaml")
+    over = ("--surface", " , ".join(system.inputs[:2]))
+    assert call("show", "system.yaml", "--picture", "over.svg", *over)[0] == 0
+    picture = ft.draw(system, surface=system.inputs[:2])
+    assert Path("over.svg").read_text("utf-8") == picture.svg
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--row force=3", "the row has no value of 'slip'"),
+        ("--row force=3,slip=much", "'slip' cannot be 'much'; it is a number"),
+        ("--row force", "--row force: must be NAME=VALUE,NAME=VALUE,..."),
+        ("--surface force", "a surface needs two different inputs, not 'force'"),
+        (
+            "--surface force,slop",
+            "a surface over 'slop', which is no input; there is force, slip "
+            "(did you mean 'slip'?)",
+        ),
+    ],
+)
+def test_a_wrong_row_or_surface_is_one_sentence_and_no_file(
+    call: Call, words: str, message: str
+) -> None:
+    code, out, err = call("show", "rules.yaml", "--picture", "no.svg", *words.split())
+    assert (code, out) == (2, "")
+    assert err.splitlines()[0] == message
+    assert not Path("no.svg").exists()
+
+
+def test_a_row_that_is_not_drawn_is_refused(call: Call) -> None:
+    for words in (("--row", "force=3,slip=1"), ("--surface", "force,slip")):
+        code, _, err = call("show", "rules.yaml", *words)
+        assert code == 2
+        assert err.startswith(
+            f"{' '.join(words)}: is drawn, and needs --picture FILE\n"
+        )
+
+
 def test_a_graph_has_no_picture(call: Call) -> None:
     code, _, err = call("show", "grip.onnx", "--picture", "no.svg")
     assert code == 2

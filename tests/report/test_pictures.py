@@ -11,6 +11,7 @@ import pytest
 from fuzzytree.auditing.decide.domain import Domain, DomainSide
 from fuzzytree.auditing.decide.states import Span
 from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.model.curves import Singleton
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -20,6 +21,7 @@ from fuzzytree.model.rulebase import (
     RuleBase,
     Shape,
     Side,
+    Term,
     Variable,
 )
 from fuzzytree.numerics.exact import exact_axis, exact_degree
@@ -34,6 +36,7 @@ from fuzzytree.report.drawing import (
     cut,
     polyline,
     spread,
+    term_curve,
     thinned,
     tick_words,
     ticks,
@@ -44,6 +47,7 @@ from fuzzytree.report.svg_terms import (
 from fuzzytree.report.svg_tree import tree_picture
 from fuzzytree.semantics.reference import descend
 from fuzzytree.testing import random_tree
+from tests.report.drawn_texts import assert_apart, texts_of
 from tests.report.page_audits import rows_of, rule_base
 
 HUGE = 1.7e308
@@ -116,17 +120,33 @@ def test_ticks_and_pictures_are_finite_whatever_the_range(
         assert not re.search("nan|inf", drawn)
 
 
-def test_names_that_do_not_fit_above_their_curves_are_counted() -> None:
+def test_names_that_do_not_fit_above_their_curves_are_numbered() -> None:
     curves = [
         curve_of(f"the term number {k}", Points((k - 1.0, k, k + 1.0), (0.0, 1.0, 0.0)))
         for k in range(30)
     ]
     many = Axis("force", "", tuple(curves), (), 0.0, 30.0)
-    drawn = terms_picture(many, None, "p")
-    named = drawn.count('class="term"')
-    assert drawn.count('class="curve"') == 24
-    assert 0 < named < 24
-    assert f"+ {24 - named} unnamed, 6 not drawn" in drawn
+    texts = texts_of(terms_picture(many, None, "p"))
+    assert len([text for text in texts if text.words.isdigit()]) >= 30
+    listing = " ".join(text.words for text in texts)
+    for number in range(1, 31):
+        assert f"{number} the term number {number - 1}" in listing
+    assert_apart(texts)
+
+
+def test_what_is_not_drawn_of_very_many_terms_is_counted() -> None:
+    curve = curve_of("on", Band(low=1.0, high=2.0))
+    many = Axis(
+        "force", "", tuple(curve._replace(name=str(k)) for k in range(62)), (), 0, 9
+    )
+    text = " ".join(text.words for text in texts_of(terms_picture(many, None, "p")))
+    assert text.endswith("2 not drawn")
+
+
+def test_a_spike_is_drawn() -> None:
+    points = curve_points(term_curve(Term("five", Singleton(5.0))), 0.0, 30.0)
+    assert (5.0, 1.0) in points
+    assert {degree for value, degree in points if value != 5.0} == {0.0}
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
+import msgspec
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -12,6 +14,8 @@ from msgspec.structs import replace
 import fuzzytree as ft
 from fuzzytree.model.tree import FuzzyTree, Leaf
 from fuzzytree.report.svg_tree import MOST_LEAVES, boxes_of, draw_tree
+from fuzzytree.testing import random_tree
+from tests.report.drawn_texts import assert_apart, texts_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -118,6 +122,19 @@ def test_names_with_signs_of_markup_or_many_letters_do_no_harm() -> None:
     )
     assert "<x>?" in written(tree)
     assert float(ElementTree.fromstring(draw_tree(tree).svg).get("width", "")) < 1200
+
+
+def test_names_of_forty_leaves_are_whole_and_apart() -> None:
+    content = msgspec.json.encode(random_tree(5, leaves=40)).decode()
+    content = re.sub(r'"x(\d)"', r'"size \1 of the <worst> nucleus & cell"', content)
+    long = msgspec.json.decode(content, type=FuzzyTree)
+    long = replace(long, name="n" * 300)
+    texts = texts_of(draw_tree(long).svg)
+    assert_apart(texts)
+    whole = " ".join(text.words for text in texts)
+    for node in long.nodes:
+        assert f"{node.variable}?" in whole
+    assert "…" not in whole
 
 
 def test_a_tree_of_too_many_leaves_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ import functools
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import cast
 
 import msgspec
 
@@ -58,7 +59,9 @@ from fuzzytree.semantics.reference import Answer, Status, descend, evaluate
 
 __all__ = [
     "FUNCTIONS",
+    "Consequent",
     "answer_of",
+    "consequents",
     "curve_degree",
     "hedged",
     "infer",
@@ -113,6 +116,50 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Answer:
     status = Status.UNCOVERED if any(map(math.isnan, numbers)) else Status.DECIDED
     outputs = tuple(values[output.name] for output in system.outputs)
     return Answer(0, None, status, tuple(run.activations), outputs)
+
+
+class Consequent(msgspec.Struct, frozen=True):
+    """What an activated rule says of an output.
+
+    Rules are numbered from 1 over all blocks; `points` are values with the degrees that
+    the rule gives them: samples of the curve, or the one number that is weighted.
+    """
+
+    rule: int
+    term: str
+    degree: float
+    points: tuple[tuple[float, float], ...]
+
+
+def consequents(
+    model: Document, row: Mapping[str, float]
+) -> dict[str, tuple[list[Consequent], list[tuple[float, float]]]]:
+    """Return by output what each activated rule concludes, and all of it joined.
+
+    Joined are the samples of an output with their aggregated degrees; weighted numbers
+    have none. A column without a value is a KeyError.
+    """
+    if not model.outputs:
+        return {}
+    system = cast("FuzzySystem", model)  # nothing else has outputs
+    values = input_values(system.variables, row)
+    run = _Run(system, values)
+    for block in system.blocks:
+        run.activate(block)
+    numbers = [k for k, rule in enumerate(system.rules, 1) for _ in rule.then]
+    result: dict[str, tuple[list[Consequent], list[tuple[float, float]]]] = {}
+    for output in system.outputs:
+        samples = [] if output.defuzzifier.is_weighted else sampled_values(output)
+        own: list[Consequent] = []
+        for one in run.of_output(output):
+            points = tuple(run.points(output, one, samples))
+            rule, term = numbers[one.place], one.conclusion.term
+            own.append(Consequent(rule, term, one.degree, points))
+        degrees = run.aggregated(output, samples) if samples else []
+        joined = zip(samples, degrees, strict=True)
+        result[output.name] = own, [*joined]
+        values[output.name] = answer(output, run.number(output))
+    return result
 
 
 def answer_of(model: Document, row: Mapping[str, float]) -> Answer:
@@ -269,11 +316,11 @@ class _Run:
         """Return how far a label was concluded: its degrees, aggregated from 0 on."""
         join = _or(output.aggregation or "sum")
         degrees = [
-            one.degree for one in self._of(output) if one.conclusion.term == label
+            one.degree for one in self.of_output(output) if one.conclusion.term == label
         ]
         return _folded(join, [0.0, *degrees])
 
-    def _of(self, output: SystemOutput) -> list[_Concluded]:
+    def of_output(self, output: SystemOutput) -> list[_Concluded]:
         """Return what was concluded of an output, in the order of the rules."""
         return sorted(self.concluded[output.name], key=lambda one: one.place)
 
@@ -296,7 +343,7 @@ class _Run:
         if is_drawn_by_lines(output):
             return self._centroid_of_lines(output)
         xs = sampled_values(output)
-        degrees = self._aggregated(output, xs)
+        degrees = self.aggregated(output, xs)
         match output.defuzzifier.method:
             case "centroid":
                 areas = _areas(output, degrees)
@@ -307,20 +354,30 @@ class _Run:
             case method:
                 return _of_maximum(method, xs, degrees)
 
-    def _aggregated(self, output: SystemOutput, xs: Sequence[float]) -> list[float]:
+    def aggregated(self, output: SystemOutput, xs: Sequence[float]) -> list[float]:
         """Return the degree of the joined conclusions at each value, from 0 on."""
         join = _or(output.aggregation)
         total = [0.0] * len(xs)
-        for one in self._of(output):
-            cut = _and(one.implication)
-            label = self.labels[output.name, one.conclusion.term]
-            if isinstance(label.function, Formula):
-                degrees = [self._label_degree(output.name, label.name, x) for x in xs]
-            else:
-                degrees = sampled_degrees(output, label)
-            for position, degree in enumerate(degrees):
-                total[position] = join(total[position], cut(one.degree, degree))
+        for one in self.of_output(output):
+            for position, (_, degree) in enumerate(self.points(output, one, xs)):
+                total[position] = join(total[position], degree)
         return total
+
+    def points(
+        self, output: SystemOutput, activated: _Concluded, xs: Sequence[float]
+    ) -> Iterator[tuple[float, float]]:
+        """Yield samples with the degrees of a conclusion, or the number that it has."""
+        cut = _and(activated.implication)
+        label = self.labels[output.name, activated.conclusion.term]
+        if output.defuzzifier.is_weighted:
+            yield self._number_of(output, label, activated.degree), activated.degree
+            return
+        if isinstance(label.function, Formula):
+            degrees = [self._label_degree(output.name, label.name, x) for x in xs]
+        else:
+            degrees = sampled_degrees(output, label)
+        for x, degree in zip(xs, degrees, strict=True):
+            yield x, cut(activated.degree, degree)
 
     def _centroid_of_lines(self, output: SystemOutput) -> float:
         """Return the centroid of the area below the lines of the grid `lines`.
@@ -328,7 +385,7 @@ class _Run:
         In a piece, `share` is 0 at its left end and 1 at its right end. Both sums are
         twice what they are called.
         """
-        known = {one.conclusion.term for one in self._of(output)}
+        known = {one.conclusion.term for one in self.of_output(output)}
         labels = [label for label in output.terms if label.name in known]
         cuts = [
             (self._so_far(output, label.name), line_tables(output, label))
@@ -372,10 +429,10 @@ class _Run:
     def _weights(self, output: SystemOutput) -> Iterator[tuple[Term, float]]:
         """Yield labels and degrees: each conclusion's, or each label's if joined."""
         if output.aggregation is None:
-            for one in self._of(output):
+            for one in self.of_output(output):
                 yield self.labels[output.name, one.conclusion.term], one.degree
             return
-        known = {one.conclusion.term for one in self._of(output)}
+        known = {one.conclusion.term for one in self.of_output(output)}
         for label in output.terms:
             if label.name in known:
                 yield label, self._so_far(output, label.name)
