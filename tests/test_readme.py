@@ -27,6 +27,7 @@ PAGES = [
     LANDING,
     ROOT / "docs" / "gallery.md",
     *sorted((ROOT / "docs" / "tutorials").glob("*.md")),
+    ROOT / "docs" / "how-to" / "draw-a-model.md",
     ROOT / "docs" / "how-to" / "explain-one-decision.md",
     ROOT / "docs" / "how-to" / "require.md",
 ]
