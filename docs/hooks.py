@@ -38,6 +38,7 @@ CODE = re.compile(
 )
 TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
 MOST_ROWS = 40
+OPTION = re.compile(r"<code>(-[^<\n]{1,30})</code>")
 COMMAND = re.compile(r'^<span class="gp">.*?</span>(.*)$', re.MULTILINE)
 
 
@@ -55,8 +56,11 @@ class Examples(griffe.Extension):
 def on_page_markdown(markdown: str, page: Page | None = None, **_: object) -> str:
     """Return a page with its marks replaced by what they name.
 
-    The search finds a page by its words in `WORDS`, too, and guides before the API.
+    The search finds a page by its words in `WORDS`, too, and guides before the API. A
+    page that is in no folder has no neighbours to list beside it.
     """
+    if page and "/" not in page.file.src_uri:
+        page.meta["hide"] = ["navigation"]
     if page and page.file.src_uri in WORDS:
         page.meta["tags"] = [*WORDS[page.file.src_uri]]
     if page and page.file.src_uri.startswith("reference/api"):
@@ -67,8 +71,10 @@ def on_page_markdown(markdown: str, page: Page | None = None, **_: object) -> st
 def on_page_content(html: str, **_: object) -> str:
     """Return a page with sessions that copy well, and long tables behind a link.
 
-    A session is copied without its prompts and output. Tables of options stay open.
+    A session is copied without its prompts and output. Tables of options stay open,
+    and an option stays on one line.
     """
+    html = OPTION.sub(r'<code class="whole">\1</code>', html)
     return TABLE.sub(_behind_link, CODE.sub(_with_commands, html))
 
 
@@ -236,11 +242,12 @@ def _on_one_line(cell: str) -> str:
 
 WORDS = {
     "alternatives.md": ("comparison", "compare tools", "versus"),
-    "gallery.md": ("pictures", "plots"),
+    "gallery.md": ("gallery", "pictures"),
     "explanation/equivalence.md": ("proof",),
     "explanation/quality.md": ("accuracy", "benchmark"),
     "how-to/audit.md": ("audit", "review"),
     "how-to/bench.md": ("speed", "latency"),
+    "how-to/draw-a-model.md": ("draw", "plot", "surface"),
     "how-to/everyday-tables.md": ("missing values", "categories", "dates"),
     "how-to/explain-one-decision.md": ("why", "counterfactual", "explain"),
     "how-to/install.md": ("install", "uninstall", "pip"),

@@ -185,6 +185,11 @@ def test_a_session_is_copied_without_its_prompts_and_output() -> None:
     assert HOOKS["on_page_content"](output) == output
 
 
+def test_an_option_stays_on_one_line() -> None:
+    html = HOOKS["on_page_content"]("<code>--front</code> <code>a-b</code>")
+    assert html == '<code class="whole">--front</code> <code>a-b</code>'
+
+
 def test_a_page_that_has_moved_leads_to_the_new_one(tmp_path: Path) -> None:
     HOOKS["on_post_build"]({"site_dir": str(tmp_path)})
     for old, new in HOOKS["MOVED"].items():
