@@ -287,7 +287,7 @@ GROUPS = {
         *("benchmarking.Footprint", "benchmarking.Study"),
         *("checking.Conversion", "checking.Stability", "learning.Front"),
         *("learning.LearningReport", "model.Reading", "model.Written"),
-        *("numerics.Certificate", "rechecking.Report", "report.Picture"),
+        *("numerics.Certificate", "rechecking.Report", "report.Page", "report.Picture"),
     ),
     "tactile": ("tactile", "tactile.open", "tactile.features_of", "tactile.names_of"),
     "errors": (

@@ -30,6 +30,7 @@ from fuzzytree.report.drawing import axis_of, curve_points, term_curve
 from fuzzytree.report.markup import Markup, source
 from fuzzytree.report.models import document_text
 from fuzzytree.report.parts import whole_page
+from fuzzytree.report.svg_terms import scale_of
 from fuzzytree.semantics import rules_of
 
 MOST_ROWS = 300
@@ -167,21 +168,18 @@ def _ends(
     one: Variable | SystemOutput, cells: Sequence[float], ends: dict[str, _Ends]
 ) -> _Ends:
     """Return from where to where the values of a variable go."""
-    if one.categories:
-        return 0.0, len(one.categories) - 1.0
-    if cells:
+    axis = axis_of(one)
+    if cells and not one.categories:
         low, high = min(cells), max(cells)
-    elif one.low is not None and one.high is not None:
-        low, high = one.low, one.high
+    elif axis.low is not None and axis.high is not None:
+        low, high = axis.low, axis.high
     elif one.parts:
         pairs = [[p.weight * (x - p.centre) for x in ends[p.input]] for p in one.parts]
         low, high = sum(map(min, pairs)), sum(map(max, pairs))
     else:
-        known = [x for curve in axis_of(one).curves for x in curve.corners]
-        known += [end for end in (one.low, one.high) if end is not None]
-        low, high = min(known, default=0.0), max(known, default=1.0)
+        low, high, *_ = scale_of(axis, None)
     room = 0.5 * max(abs(low), 1.0)
-    return (low, high) if high > low else (low - room, high + room)
+    return (low, high) if high > low or one.categories else (low - room, high + room)
 
 
 def _step(width: float) -> float:
