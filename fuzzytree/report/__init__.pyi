@@ -16,6 +16,7 @@ from .formats import overview_lines as overview_lines
 from .formats import runtime_facts as runtime_facts
 from .markup import Markup as Markup
 from .markup import mark as mark
+from .markup import policy_of as policy_of
 from .models import document_facts as document_facts
 from .models import document_text as document_text
 from .models import fact_lines as fact_lines

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import functools
-import hashlib
-import re
 from collections.abc import Callable, Iterator, Sequence
 
 from fuzzytree.auditing import CODES, Coordinate, Measure, State, Witness
@@ -19,7 +16,14 @@ from fuzzytree.report.audit_states import (
     state_text,
     state_word,
 )
-from fuzzytree.report.markup import Markup, macros, source, template, text_lines
+from fuzzytree.report.markup import (
+    Markup,
+    macros,
+    policy_of,
+    source,
+    template,
+    text_lines,
+)
 from fuzzytree.report.pictures import class_mark
 from fuzzytree.report.stability import (
     CRITERION,
@@ -56,24 +60,10 @@ def whole_page(name: str = "page.html", **parts: object) -> str:
     """Return a page with its parts, and with the policy of what it may do."""
     text = source(name).replace("/* pictures */\n", source("pictures.css"))
     page = template(text).render(policy=_POLICY, **parts)
-    return page.replace(_POLICY, _policy(page), 1)  # the head has it, before any name
+    return page.replace(_POLICY, policy_of(page), 1)  # the head has it, before any name
 
 
 _POLICY = "@policy@"
-
-
-def _policy(page: str) -> str:
-    """Return what the page may do: run its own styles and scripts."""
-    allowed: list[str] = []
-    for kind in ("script", "style"):
-        digests = (
-            base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
-            for content in re.findall(f"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
-        )
-        hashes = " ".join(f"'sha256-{digest}'" for digest in digests)
-        allowed.append(f"{kind}-src {hashes}")
-    others = "base-uri 'none'; form-action 'none'"
-    return f"default-src 'none'; {'; '.join(allowed)}; {others}"
 
 
 def title_of(code: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import contextlib
 import dataclasses
-import hashlib
 import re
 import socket
 import sys
@@ -20,6 +19,7 @@ import msgspec
 
 from fuzzytree.errors import PortError
 from fuzzytree.files import reason
+from fuzzytree.report import policy_of
 from fuzzytree.tactile.recognition.live import STATES, Live, LiveView
 from fuzzytree.tactile.report.live import (
     PALETTE,
@@ -48,6 +48,7 @@ _BACKLOG = 1 << 16  # bytes that wait for a slow browser: newer frames replace o
 _MOST_POINTS = 1 << 16  # of a picture
 
 _TARE = ("POST", "/tare")
+_OTHERS = "connect-src 'self'; img-src data:; frame-ancestors 'none'; "
 _EVENTS = re.compile(r"/events(?:\?times=([1-9]))?")
 
 _HEADERS = {
@@ -93,7 +94,7 @@ class LivePage(ThreadingHTTPServer):
         self._room = threading.BoundedSemaphore(MOST_BROWSERS)
         content = resources.files("fuzzytree.tactile.report").joinpath("live.html")
         self.content = content.read_bytes()
-        self.policy = _policy(self.content.decode())
+        self.policy = policy_of(self.content.decode(), _OTHERS)
         try:
             super().__init__((ADDRESS, port), _Handler)
         except (OSError, OverflowError) as error:
@@ -219,19 +220,6 @@ class _Handler(BaseHTTPRequestHandler):
     def _send(self, name: str, facts: object) -> None:
         data = msgspec.json.encode(facts)
         self.wfile.write(b"event: %s\ndata: %s\n\n" % (name.encode(), data))
-
-
-def _policy(page: str) -> str:
-    """Return what the page may do: run its own script and style, and ask this host."""
-    policy = "default-src 'none'; "
-    for kind in ("script", "style"):
-        content = page.partition(f"<{kind}>")[2].partition(f"</{kind}>")[0]
-        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
-        policy += f"{kind}-src 'sha256-{digest}'; "
-    return policy + (
-        "connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; "
-        "frame-ancestors 'none'"
-    )
 
 
 def view_facts(view: LiveView, times: int) -> dict[str, object]:

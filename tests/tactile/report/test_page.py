@@ -102,7 +102,7 @@ def test_the_policy_allows_the_own_script_and_style_and_nothing_else(
     sha = "'sha256-[A-Za-z0-9+/]{43}='"
     assert re.fullmatch(
         f"default-src 'none'; script-src {sha}; style-src {sha}; connect-src 'self'; "
-        "img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+        "img-src data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
         policy,
     )
     assert found.headers["X-Content-Type-Options"] == "nosniff"
