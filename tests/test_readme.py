@@ -1,6 +1,6 @@
 """The commands of the README and the tutorials print what these pages show.
 
-`python tests/test_readme.py` rewrites the outputs and the picture; review the diff.
+`python tests/test_readme.py` rewrites the outputs and the pictures; review the diff.
 """
 
 from __future__ import annotations
@@ -11,10 +11,9 @@ import importlib
 import io
 import os
 import re
-import runpy
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -77,11 +76,6 @@ def test_no_example_prints_more_than_a_few_lines(page: Path) -> None:
                 assert session.count("\n") <= MOST_OUTPUT, session
 
 
-def test_the_picture_is_the_one_that_its_script_draws() -> None:
-    drawn = _script("picture.py")["drawn"]()
-    assert (ROOT / "docs" / "wine.svg").read_text("utf-8") == drawn
-
-
 def test_the_wine_table_holds_the_numbers_of_scikit_learn() -> None:
     from sklearn.datasets import load_wine
 
@@ -116,6 +110,7 @@ def _rewritten_examples(text: str, folder: Path) -> str:
     pieces: list[str] = []
     end = 0
     output: str | None = None
+    names: dict[str, object] = {"__name__": "readme"}
     for match in FENCE.finditer(text):
         kind, body = match.groups()
         if kind == "console":
@@ -124,7 +119,7 @@ def _rewritten_examples(text: str, folder: Path) -> str:
             body = output
         pieces += [text[end : match.start()], f"```{kind}\n{body}```\n"]
         end = match.end()
-        output = _printed(body, folder) if kind == "python" else None
+        output = _printed(body, folder, names) if kind == "python" else None
     return "".join([*pieces, text[end:]])
 
 
@@ -156,21 +151,17 @@ def _pictures(page: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
             yield shown, drawn
 
 
-def _printed(code: str, folder: Path) -> str:
+def _printed(code: str, folder: Path, names: dict[str, object]) -> str:
+    """Run a Python block, after those before it on its page."""
     printed = io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
-        exec(compile(code, str(README), "exec"), {"__name__": "readme"})
+        exec(compile(code, str(README), "exec"), names)
     return printed.getvalue()
-
-
-def _script(name: str) -> dict[str, Callable[[], str]]:
-    return runpy.run_path(str(ROOT / "examples" / name), run_name="readme")
 
 
 def _rewrite() -> None:
     import tempfile
 
-    (ROOT / "docs" / "wine.svg").write_text(_script("picture.py")["drawn"](), "utf-8")
     for page in PAGES:
         with tempfile.TemporaryDirectory() as folder:
             text = _rewritten_examples(page.read_text("utf-8"), Path(folder))
