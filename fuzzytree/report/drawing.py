@@ -26,10 +26,23 @@ from fuzzytree.model import (
 from fuzzytree.model import Curve as SystemCurve
 from fuzzytree.numerics import exact_degree
 from fuzzytree.report.markup import Markup, mark, trimmed
+from fuzzytree.report.pictures import Picture, picture
 from fuzzytree.semantics import curve_degree
 
 LETTER = 0.58
 """How wide a letter of a picture is on average, in sizes of its font."""
+
+EDGE = 12.0
+"""Points around what a sheet holds."""
+
+LOOKS = {
+    **{"strong": (14.0, 17.0), "words": (12.0, 15.0)},
+    **{"term": (11.0, 14.0), "small": (10.5, 13.0)},
+}
+"""How large letters of a look are at most, and how far lines are apart, in points."""
+
+Block = tuple[list[Markup], float]
+"""Marks from (0, 0) on, and how high they are."""
 
 _STEPS = 72  # at which a curve is evaluated, beside its corners
 _CORNERS = 160  # of one curve that are drawn exactly
@@ -312,49 +325,96 @@ def lines_within(words: str | Sequence[str], wide: float, size: float) -> list[s
         ['area of the', 'worst', 'nucleus']
     """
     lines = [""]
-    parts = words.split() if isinstance(words, str) else words
-    for word in map(printable, parts):
-        joined = f"{lines[-1]} {word}".lstrip()
-        if text_width(joined, size) <= wide:
-            lines[-1] = joined
+    for word in map(printable, words.split() if isinstance(words, str) else words):
+        line = f"{lines[-1]} {word}".lstrip()
+        if text_width(line, size) <= wide:
+            lines[-1] = line
             continue
         lines += [""] if lines[-1] else []
         for letter in word:
             if lines[-1] and text_width(lines[-1] + letter, size) > wide:
                 lines.append("")
             lines[-1] += letter
-    return lines if lines != [""] else []
+    return [line for line in lines if line]
 
 
-def word_lines(
-    x: float, y: float, lines: Sequence[str], look: str, step: float, anchor: str = ""
-) -> Iterator[Markup]:
-    """Yield lines of words below one another, from the base of the first."""
-    for place, line in enumerate(lines):
-        yield mark("words", x, y + step * place, line, look, anchor)
+def listing(words: Sequence[str], sign: str = ";") -> list[str]:
+    """Return words with a sign behind each but the last.
+
+    Example:
+        >>> listing(["a = 1", "b = 2"])
+        ['a = 1;', 'b = 2']
+    """
+    return [*(f"{word}{sign}" for word in words[:-1]), *words[-1:]]
 
 
-def legend(
-    entries: Sequence[tuple[Markup, str]], left: float, top: float, wide: float
-) -> tuple[list[Markup], float]:
-    """Return signs with their names, in rows that fit a width, and how high they are.
+def text_block(
+    x: float,
+    top: float,
+    words: str | Sequence[str],
+    wide: float,
+    look: str = "small",
+    anchor: str = "",
+) -> Block:
+    """Return words in lines that fit a width, and how high they are."""
+    size, step = LOOKS[look.partition(" ")[0]]
+    lines = lines_within(words, wide, size)
+    marks = [
+        mark("words", x, top + step * place - 3.0, line, look, anchor)
+        for place, line in enumerate(lines, 1)
+    ]
+    return marks, step * len(lines)
+
+
+def legend(entries: Sequence[tuple[Markup, str]], wide: float) -> Block:
+    """Return signs with their names, in rows that fit a width.
 
     A sign lies right of its origin, and above it: 18 points wide, 9 high.
     """
     marks: list[Markup] = []
-    at, base, high = left, top + 11.0, 0.0
+    left = top = high = 0.0
     for sign, name in entries:
-        lines = lines_within(name, wide - 24.0, 11.0)
-        size = 24.0 + max((text_width(line, 11.0) for line in lines), default=0.0)
-        if at > left and at + size > left + wide:
-            at, base = left, base + high
-            high = 0.0
-        words = word_lines(24.0, 0.0, lines, "term", 14.0)
-        marks.append(
-            mark("group", [sign, *words], move=f"translate({at:.1f} {base:.1f})")
-        )
-        at, high = at + size + 16.0, max(high, 14.0 * len(lines) + 4.0)
-    return marks, base + high - top - 11.0
+        words, size = text_block(24.0, -11.0, name, wide - 24.0, "term")
+        lines = lines_within(name, wide - 24.0, LOOKS["term"][0])
+        room = 24.0 + max(text_width(line, LOOKS["term"][0]) for line in lines or [""])
+        if left and left + room > wide:
+            left, top, high = 0.0, top + high, 0.0
+        move = f"translate({left:.1f} {top + 11.0:.1f})"
+        marks.append(mark("group", [sign, *words], move=move))
+        left, high = left + room + 16.0, max(high, size + 4.0)
+    return marks, top + high
+
+
+class Sheet:
+    """A picture that grows downwards, from its heading on."""
+
+    def __init__(self, wide: float, heading: str) -> None:
+        self.inside, self.heading = wide, heading
+        self.top = 4.0
+        self.marks: list[Markup] = []
+        self.words(heading, "strong")
+
+    def words(self, words: str | Sequence[str], look: str = "small") -> None:
+        """Add words in lines."""
+        self.row([text_block(0.0, 0.0, words, self.inside, look)])
+
+    def row(
+        self, blocks: Sequence[Block], step: float = 0.0, about: str | None = None
+    ) -> None:
+        """Add blocks beside each other, each a step further to the right."""
+        parts = [
+            mark("group", marks, move=f"translate({step * place:.1f} 0)")
+            for place, (marks, _) in enumerate(blocks)
+            if marks
+        ]
+        move = f"translate({EDGE:.1f} {self.top:.1f})"
+        self.marks.append(mark("group", parts, about, move))
+        self.top += max((high for _, high in blocks), default=0.0)
+
+    def picture(self, about: str, rules: str = "") -> Picture:
+        """Return what was added; readers of a screen say the heading and more."""
+        wide, high = self.inside + 2 * EDGE, self.top + EDGE
+        return picture(self.marks, wide, high, self.heading, rules, about)
 
 
 def axis_marks(x: Scale, base: float) -> Iterator[Markup]:
@@ -369,6 +429,22 @@ def axis_marks(x: Scale, base: float) -> Iterator[Markup]:
         if left - half > previous + 4:
             previous = left + half
             yield mark("words", left, base + 15, word, "small", "middle")
+
+
+def frame_marks(x: Scale, y: Scale, across: str, up: str) -> Iterator[Markup]:
+    """Yield a frame with the numbers and the names of both axes."""
+    wide, high = x.end - x.start, y.start - y.end
+    yield mark("rect", x.start, y.end, wide, high, "axis")
+    yield from axis_marks(x, y.start)
+    values = ticks(y.low, y.high, 5)
+    for value, word in zip(values, tick_words(values), strict=True):
+        yield mark("line", x.start - 4.0, x.start, y.at(value), y.at(value), "tick")
+        yield mark("words", x.start - 8.0, y.at(value) + 4.0, word, "small", "end")
+    middle = (x.start + x.end) / 2.0
+    yield from text_block(middle, y.start + 21.0, across, wide, "term", "middle")[0]
+    words, size = text_block(0.0, 0.0, up, high, "term", "middle")
+    turn = f"translate({x.start - 52.0 - size:.1f} {(y.start + y.end) / 2.0:.1f})"
+    yield mark("group", words, move=f"{turn} rotate(-90)")
 
 
 def spread(values: Sequence[float], share: float = 0.03) -> tuple[float, float]:

@@ -323,9 +323,8 @@ def _legend(
     signs.append(("best trade-off", marker("runtime", 9, -4, "form", is_full=True)))
     if has_floors:
         signs.append(("floor", mark("line", 0, 18, -4, -4, "dashed")))
-    yield from legend(
-        [(sign, name) for name, sign in signs], _LEFT, base - 11.0, _WIDE
-    )[0]
+    parts, _ = legend([(sign, name) for name, sign in signs], _RIGHT - _LEFT)
+    yield mark("group", parts, move=f"translate({_LEFT:.1f} {base - 11.0:.1f})")
 
 
 def _names(panels: Sequence[Panel], floors: Sequence[float]) -> Iterator[Markup]:

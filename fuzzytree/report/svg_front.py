@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from statistics import fmean
 from typing import TYPE_CHECKING
 
-from fuzzytree.report.drawing import Scale, path_of
-from fuzzytree.report.markup import Markup, mark
+from fuzzytree.report.drawing import Scale, frame_marks, path_of
+from fuzzytree.report.markup import mark
 from fuzzytree.report.pictures import Picture, class_mark, picture
 from fuzzytree.report.text import counted
 
 if TYPE_CHECKING:
     from fuzzytree.learning import Front
 
-_WIDE, _HIGH = 460.0, 330.0
-_LEFT, _RIGHT, _TOP, _BASE = 50.0, 350.0, 50.0, 276.0
+_WIDE, _HIGH = 484.0, 330.0
+_LEFT, _RIGHT, _TOP, _BASE = 74.0, 374.0, 50.0, 276.0
 _LETTERING = 13.0  # points from one line of words to the next
 
 
@@ -36,11 +36,14 @@ def draw_front(front: Front, *, title: str = "") -> Picture:
     margin = max(0.02, 0.05 * (high - low))
     y = Scale(max(0.0, low - margin), min(1.0, high + margin), _BASE, _TOP)
     x = Scale(min(front.leaves), max(front.leaves) + 1e-9, _LEFT, _RIGHT)
+    level = y.at(front.majority)
     facts = f"on {counted(front.rows, 'row')} held out, by columns per node"
     marks = [
         mark("words", 10, 20, heading, "strong"),
         mark("words", 10, 38, facts, "small"),
-        *_axes(front, x, y),
+        mark("line", _LEFT, _RIGHT, level, level, "dashed"),
+        mark("words", _LEFT + 6, level - 4, "majority class", "small"),
+        *frame_marks(x, y, "leaves", "accuracy"),
     ]
     places = _apart([y.at(row[-1]) for row in front.accuracy])
     for number, (columns, row) in enumerate(
@@ -69,20 +72,3 @@ def _apart(places: Sequence[float]) -> dict[int, float]:
             groups[-2:] = [groups[-2] + groups[-1]]
     means = [fmean(group) for group in groups for _ in group]
     return {k: means[rank] + _LETTERING * rank for rank, k in enumerate(order)}
-
-
-def _axes(front: Front, x: Scale, y: Scale) -> Iterator[Markup]:
-    yield mark("rect", _LEFT, _TOP, _RIGHT - _LEFT, _BASE - _TOP, "axis")
-    level = y.at(front.majority)
-    yield mark("path", path_of([(_LEFT, level), (_RIGHT, level)]), "dashed")
-    yield mark("words", _LEFT + 6, level - 4, "majority class", "small")
-    for leaves in front.leaves:
-        if leaves % 2 == 0:
-            word = str(leaves)
-            yield mark("words", x.at(leaves), _BASE + 15, word, "small", "middle")
-    for part in range(5):
-        share = y.low + (y.high - y.low) * part / 4
-        word = f"{share:.2f}"
-        yield mark("words", _LEFT - 6, y.at(share) + 4, word, "small", "end")
-    middle = (_LEFT + _RIGHT) / 2
-    yield mark("words", middle, _BASE + 36, "leaves", "small", "middle")

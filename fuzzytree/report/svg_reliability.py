@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.report.drawing import Scale, path_of
+from fuzzytree.report.drawing import Scale, frame_marks, path_of
 from fuzzytree.report.markup import Markup, mark
 from fuzzytree.report.pictures import Picture, picture
 from fuzzytree.report.text import counted
@@ -15,8 +15,8 @@ from fuzzytree.report.text import counted
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray, IntArray
 
-_WIDE, _HIGH = 320.0, 372.0
-_X = Scale(0.0, 1.0, 46.0, 306.0)
+_WIDE, _HIGH = 348.0, 372.0
+_X = Scale(0.0, 1.0, 74.0, 334.0)
 _Y = Scale(0.0, 1.0, 316.0, 56.0)
 _BAR = 40.0  # high, of the most rows
 _BINS = 10  # parts of equal width of [0, 1]
@@ -88,13 +88,5 @@ def _frame(rows: list[int]) -> Iterator[Markup]:
         left = _X.start + step * place
         yield mark("rect", left + 1, base - high, step - 2, high, "bin")
     yield mark("path", path_of([(_X.start, base), (_X.end, top)]), "dashed")
-    yield mark("rect", _X.start, top, _X.end - _X.start, base - top, "axis")
-    for value, word in ((0.0, "0"), (0.5, "0.5"), (1.0, "1")):
-        yield mark("words", _X.at(value), base + 15, word, "small", "middle")
-        yield mark("words", _X.start - 6, _Y.at(value) + 4, word, "small", "end")
-    middle = (_X.start + _X.end) / 2
     about = "probability of the predicted class"
-    yield mark("words", middle, base + 36, about, "small", "middle")
-    turned = f"translate(14 {(base + top) / 2:.1f}) rotate(-90)"
-    said = mark("words", 0, 0, "share of rows that are right", "small", "middle")
-    yield mark("group", [said], move=turned)
+    yield from frame_marks(_X, _Y, about, "share of rows that are right")

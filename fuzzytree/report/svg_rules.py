@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 from fuzzytree.model import (
     And,
@@ -19,21 +19,22 @@ from fuzzytree.model import (
     Variable,
 )
 from fuzzytree.report.drawing import (
+    Block,
     Curve,
     Scale,
+    Sheet,
     axis_marks,
     axis_of,
     curve_points,
-    lines_within,
+    listing,
     path_of,
     polyline,
-    spread,
-    word_lines,
+    text_block,
 )
-from fuzzytree.report.markup import Markup, mark
+from fuzzytree.report.markup import mark
 from fuzzytree.report.models import Rules, rule_text
-from fuzzytree.report.pictures import Picture, class_mark, picture
-from fuzzytree.report.svg_terms import scale_of, sum_lines
+from fuzzytree.report.pictures import Picture, class_mark
+from fuzzytree.report.svg_terms import scale_of, sum_words
 from fuzzytree.report.text import number
 from fuzzytree.semantics import (
     Status,
@@ -48,42 +49,21 @@ from fuzzytree.semantics import (
 MOST_RULES = 100
 """Of a picture."""
 
-_EDGE, _GAP = 12.0, 16.0
-_NUMBER, _CELL, _END = 34.0, 132.0, 120.0  # wide: rule numbers, cells, strengths
-_PLOT, _LINE, _ROW = 30.0, 13.0, 10.0  # high: curves, lines of words, between rows
-_SMALL, _STRONG = 10.5, 14.0  # sizes of words
-
-
-class _Cell(NamedTuple):
-    """The marks of a part of a row, and how high they are."""
-
-    marks: list[Markup]
-    high: float
+_NUMBER, _CELL, _GAP, _END = 34.0, 132.0, 16.0, 104.0  # wide: from left to right
+_PLOT, _ROW = 30.0, 10.0  # high: curves, and between rows
+_ABOUT = "A row for each rule, a cell for each proposition: curve, value and degree. "
+_STYLE = ".filled { fill: var(--k, var(--c0)); fill-opacity: .35; }\n"
 
 
 def draw_rules(
     model: Document, row: Mapping[str, float], *, title: str | None = None
 ) -> Picture:
-    """Draw what the rules of a model make of a row; of a tree, its relative rules.
+    """Draw what at most `MOST_RULES` rules make of a row; of a tree the relative rules.
 
     Each rule is a row, each of its propositions a cell: the curve of the terms, a line
     at the value, and the area up to its degree. The strength stands at the right. Of a
     system follow the conclusions, cut as the rules are activated, and below them the
     joined area with the number that it becomes.
-
-    Args:
-        model: At most `MOST_RULES` rules.
-        row: A finite number for each input.
-        title: Above the picture; by default the name of the model.
-
-    Raises:
-        ValueError: If there are more rules, or a combination of the values overflows.
-
-    Example:
-        >>> from fuzzytree.testing import random_tree
-        >>> tree = random_tree(1, leaves=2)
-        >>> "rule 1" in draw_rules(tree, dict.fromkeys(tree.inputs, 0.0)).svg
-        True
     """
     base = rules_of(model)
     rules: Rules = base.rules
@@ -98,101 +78,75 @@ def draw_rules(
             "the values of the row are so large that a combination overflows"
         )
     scene = _Scene(base, row)
-    columns = [*scene.columns, *base.outputs]
-    wide = _NUMBER + len(columns) * (_CELL + _GAP) + _END + 2 * _EDGE
-    heading = f"The rules of {model.name} for a row" if title is None else title
-    verdict = _verdict(base, answer.rule, answer.label, answer.outputs)
-    inside = wide - 2 * _EDGE
-    lines = lines_within(heading, inside, _STRONG)
-    marks = [*word_lines(_EDGE, 20.0, lines, "strong", 17.0)]
-    top = 17.0 * len(lines) + 8.0
-    lines = lines_within(verdict, inside, 12.0)
-    marks += word_lines(_EDGE, top + _LINE, lines, "words", 15.0)
-    top += 15.0 * len(lines)
-    pairs = [f"{name} = {scene.word(name)}" for name in base.inputs]
-    notes = lines_within(
-        [f"{pair};" for pair in pairs[:-1]] + pairs[-1:], inside, _SMALL
+    numbers = [*zip(base.outputs, answer.outputs, strict=True)]
+    columns = len(scene.columns) + len(numbers)
+    sheet = Sheet(
+        _NUMBER + columns * (_CELL + _GAP) + _END,
+        title or f"The rules of {model.name} for a row",
     )
+    verdict = "; ".join(f"{one.name} is {number(value)}" for one, value in numbers)
+    if not numbers:
+        by = f"by rule {answer.rule}" if answer.rule else "as no rule fires"
+        verdict = (
+            f"The class is {answer.label}, {by}" if answer.label else f"No class, {by}"
+        )
+    sheet.words(verdict, "words")
+    sheet.words(listing([f"{name} = {scene.word(name)}" for name in base.inputs]))
+    heads = [f"{column.name} = {scene.word(column.name)}" for column in scene.columns]
+    heads += [output.name for output in base.outputs]
     for column in scene.columns:
-        notes += sum_lines(column, inside, _SMALL)
-    marks += word_lines(_EDGE, top + _LINE, notes, "small", _LINE)
-    top += _LINE * (len(notes) + 1)
-    heads = [
-        [*lines_within(column.name, _CELL, 11.0), f"= {scene.word(column.name)}"]
-        for column in scene.columns
-    ]
-    heads += [lines_within(output.name, _CELL, 11.0) for output in base.outputs]
-    for place, head in enumerate(heads):
-        marks += word_lines(_left(place), top + _LINE, head, "term", _LINE)
-    top += _LINE * max(map(len, heads), default=0) + _ROW
+        sheet.words(sum_words(column))
+    blocks = [text_block(0.0, 0.0, head, _CELL, "term") for head in heads]
+    sheet.top += _ROW
+    _add_row(sheet, blocks, look="")
     for k, rule in enumerate(rules, 1):
         strength = answer.strengths[k - 1]
-        cells = [scene.cell(rule, column) for column in scene.columns]
-        cells += [scene.conclusion(rule, k, output) for output in base.outputs]
-        end = _end(base, rule, strength)
-        high = max(cell.high for cell in [*cells, end])
-        parts = [mark("line", _EDGE, wide - _EDGE, 0.0, 0.0, "grid")]
-        if k == answer.rule:
-            size = high + _ROW / 2
-            parts.append(mark("rect", _EDGE - 4, 1.0, inside + 8, size, "track", 4.0))
-        parts.append(mark("words", _EDGE, _LINE + 3.0, str(k), "strong"))
-        parts += _moved(cells, end)
+        blocks = [scene.cell(rule, column) for column in scene.columns]
+        blocks += [scene.conclusion(rule, k, output) for output in base.outputs]
+        blocks.append(_strength(base, rule, strength))
         about = f"rule {k}, strength {number(strength)}: {rule_text(rule)}"
-        marks.append(mark("group", parts, about, f"translate(0 {top:.1f})"))
-        top += high + _ROW
-    if base.outputs:
-        numbers = zip(base.outputs, answer.outputs, strict=True)
-        cells = [_Cell([], 0.0) for _ in scene.columns]
-        cells += [scene.result(output, value) for output, value in numbers]
-        parts = [mark("line", _EDGE, wide - _EDGE, 0.0, 0.0, "axis")]
-        parts += _moved(cells, _Cell([], 0.0))
-        marks.append(mark("group", parts, verdict, f"translate(0 {top:.1f})"))
-        top += max(cell.high for cell in cells) + _ROW
-    about = "A row for each rule, a cell for each proposition: curve, value and degree"
-    return picture(marks, wide, top + _ROW, heading, _STYLE, f"{about}. {verdict}")
+        _add_row(sheet, blocks, str(k), about, is_winner=k == answer.rule)
+    if numbers:
+        blocks = [([], 0.0) for _ in scene.columns]
+        blocks += [scene.result(output, value) for output, value in numbers]
+        _add_row(sheet, blocks, about=verdict, look="axis")
+    return sheet.picture(_ABOUT + verdict, _STYLE)
 
 
-_STYLE = """
-.filled { fill: var(--k, var(--c0)); fill-opacity: .35; }
-"""
+def _add_row(
+    sheet: Sheet,
+    blocks: Sequence[Block],
+    words: str = "",
+    about: str | None = None,
+    *,
+    look: str = "grid",
+    is_winner: bool = False,
+) -> None:
+    """Add blocks to the right of a number, below a line."""
+    high = max((high for _, high in blocks), default=0.0) + _ROW
+    marks = [mark("line", 0.0, sheet.inside, 0.0, 0.0, look)] if look else []
+    if is_winner:
+        marks.append(mark("rect", -4.0, 1.0, sheet.inside + 8.0, high - 4.0, "track"))
+    marks += text_block(0.0, 2.0, words, _NUMBER, "strong")[0]
+    for place, (parts, _) in enumerate(blocks):
+        move = f"translate({_NUMBER + place * (_CELL + _GAP):.1f} 4)"
+        marks += [mark("group", parts, move=move)] if parts else []
+    sheet.row([(marks, high)], about=about)
 
 
-def _left(place: int) -> float:
-    """Return where a column begins."""
-    return _EDGE + _NUMBER + place * (_CELL + _GAP)
-
-
-def _moved(cells: Sequence[_Cell], end: _Cell) -> Iterator[Markup]:
-    for place, cell in enumerate([*cells, end]):
-        if cell.marks:
-            yield mark("group", cell.marks, move=f"translate({_left(place):.1f} 5)")
-
-
-def _verdict(
-    model: Document, rule: int, label: str | None, outputs: Sequence[float]
-) -> str:
-    if model.outputs:
-        numbers = zip(model.outputs, outputs, strict=True)
-        return "; ".join(f"{one.name} is {number(value)}" for one, value in numbers)
-    by = f"by rule {rule}" if rule else "as no rule fires"
-    return f"The class is {label}, {by}" if label else f"No class, {by}"
-
-
-def _end(model: Document, rule: Rule | SystemRule, strength: float) -> _Cell:
+def _strength(model: Document, rule: Rule | SystemRule, strength: float) -> Block:
     """Return the strength of a rule as a number and a bar, with its class."""
-    own, lines = "", list[str]()
+    own, name = "", ""
     if isinstance(rule, Rule):
-        own = f" {class_mark(model.classes.index(rule.then))}"
-        lines = lines_within(rule.then, _END - 8.0, _STRONG)
-    marks = [*word_lines(0.0, _LINE, lines, f"strong{own}", 16.0)]
-    top = 16.0 * len(lines)
-    wide = _END - 50.0
+        own, name = f" {class_mark(model.classes.index(rule.then))}", rule.then
+    marks, top = text_block(0.0, 0.0, name, _END, f"strong{own}")
+    wide = _END - 44.0
     marks += [
         mark("rect", 0.0, top + 4.0, wide, 8.0, "track"),
         mark("rect", 0.0, top + 4.0, wide * min(strength, 1.0), 8.0, f"bar{own}"),
         mark("words", wide + 6.0, top + 12.0, _short(strength), "small"),
     ]
-    return _Cell(marks, top + 18.0)
+    return marks, top + 18.0
 
 
 def _short(value: float) -> str:
@@ -231,22 +185,18 @@ class _Scene:
         whole, value = scale_of(axis_of(variable), None), self.values[variable.name]
         return Scale(min(whole.low, value), max(whole.high, value), 0.0, _CELL)
 
-    def cell(self, rule: Rule | SystemRule, column: Variable) -> _Cell:
+    def cell(self, rule: Rule | SystemRule, column: Variable) -> Block:
         """Return the propositions of a rule about a variable, below one another."""
-        marks: list[Markup] = []
-        top = 0.0
         x, value = self.scales[column.name], self.values[column.name]
+        plots: list[Block] = []
         for proposition in _propositions(rule.when):
-            if proposition.variable != column.name:
-                continue
-            curve = self._curve(proposition, column)
-            level = curve.degree(value)
-            points = curve_points(_clipped(curve, level), x.low, x.high)
-            words = (*proposition.hedges, " or ".join(proposition.terms))
-            plot = _plot(" ".join(words), _short(level), x, [curve], points, value)
-            marks.append(mark("group", plot.marks, move=f"translate(0 {top:.1f})"))
-            top += plot.high
-        return _Cell(marks, top)
+            if proposition.variable == column.name:
+                curve = self._curve(proposition, column)
+                level = curve.degree(value)
+                points = curve_points(_clipped(curve, level), x.low, x.high)
+                words = " ".join((*proposition.hedges, " or ".join(proposition.terms)))
+                plots.append(_plot(words, level, x, [curve], points, value))
+        return _below(plots)
 
     def _curve(self, proposition: Proposition, variable: Variable) -> Curve:
         terms = [term for term in variable.terms if term.name in proposition.terms]
@@ -264,48 +214,48 @@ class _Scene:
 
     def conclusion(
         self, rule: Rule | SystemRule, position: int, output: SystemOutput
-    ) -> _Cell:
+    ) -> Block:
         """Return what a rule concludes of an output, as far as it is activated."""
-        marks: list[Markup] = []
-        top = 0.0
-        concluded = self.conclusions[output.name][0]
-        x, axis = self._output_scale(output), axis_of(output)
-        ends = rule.then if isinstance(rule, SystemRule) else ()
-        for name in [end.term for end in ends if end.output == output.name]:
-            own = [c for c in concluded if c.rule == position and c.term == name]
-            is_weighted = output.defuzzifier.is_weighted
-            curves = [c for c in axis.curves if c.name == name and not is_weighted]
-            level, points = (own[0].degree, own[0].points) if own else (0.0, ())
-            words = name
-            if is_weighted and points:
-                words = f"{name}: {number(points[0][0])}"
-            plot = _plot(
-                words, _short(level), x, curves, points, None, is_area=not is_weighted
-            )
-            marks.append(mark("group", plot.marks, move=f"translate(0 {top:.1f})"))
-            top += plot.high
-        return _Cell(marks, top)
+        x, is_weighted = self._output_scale(output), output.defuzzifier.is_weighted
+        activated = {
+            c.term: c for c in self.conclusions[output.name][0] if c.rule == position
+        }
+        plots: list[Block] = []
+        for end in rule.then if isinstance(rule, SystemRule) else ():
+            if end.output != output.name:
+                continue
+            own, name = activated.get(end.term), end.term
+            curves = [c for c in axis_of(output).curves if c.name == name]
+            level, points = (own.degree, own.points) if own else (0.0, ())
+            if is_weighted:
+                name += f": {number(points[0][0])}" if points else ""
+                curves = []
+            plots.append(_plot(name, level, x, curves, points, is_area=not is_weighted))
+        return _below(plots)
 
     def _output_scale(self, output: SystemOutput) -> Scale:
         whole = scale_of(axis_of(output), None)
-        concluded, _ = self.conclusions[output.name]
-        values = [value for one in concluded for value, _ in one.points]
-        low, high = min([whole.low, *values]), max([whole.high, *values])
-        return Scale(
-            *((low, high) if whole.low < whole.high else spread([low, high])),
-            0.0,
-            _CELL,
-        )
+        values = [v for c in self.conclusions[output.name][0] for v, _ in c.points]
+        ends = min([whole.low, *values]), max([whole.high, *values])
+        return Scale(*ends, 0.0, _CELL)
 
-    def result(self, output: SystemOutput, value: float) -> _Cell:
+    def result(self, output: SystemOutput, value: float) -> Block:
         """Return all conclusions of an output together, and its number."""
-        concluded, joined = self.conclusions[output.name]
+        activated, joined = self.conclusions[output.name]
         x = self._output_scale(output)
-        points = joined or [point for one in concluded for point in one.points]
+        points = joined or [point for one in activated for point in one.points]
         words = f"{output.name} = {number(value)} {output.unit}".rstrip()
         pin = value if x.low <= value <= x.high else None
-        plot = _plot(words, "", x, [], points, pin, is_area=bool(joined))
-        return _Cell([*plot.marks, *axis_marks(x, plot.high - 4.0)], plot.high + 20.0)
+        marks, high = _plot(words, None, x, [], points, pin, is_area=bool(joined))
+        return [*marks, *axis_marks(x, high - 4.0)], high + 16.0
+
+
+def _below(blocks: Sequence[Block]) -> Block:
+    """Return blocks below one another."""
+    tops = [0.0, *itertools.accumulate(high for _, high in blocks)]
+    moves = (f"translate(0 {top:.1f})" for top in tops)
+    pairs = zip(blocks, moves, strict=False)
+    return [mark("group", marks, move=move) for (marks, _), move in pairs], tops[-1]
 
 
 def _clipped(curve: Curve, level: float) -> Curve:
@@ -317,32 +267,32 @@ def _clipped(curve: Curve, level: float) -> Curve:
 
 def _plot(
     words: str,
-    level: str,
+    level: float | None,
     x: Scale,
     curves: Sequence[Curve],
     points: Sequence[tuple[float, float]],
-    value: float | None,
+    value: float | None = None,
     *,
     is_area: bool = True,
-) -> _Cell:
-    """Return curves over an area or a spike, under words with a number at the right."""
-    lines = lines_within(words, _CELL - 36.0 if level else _CELL, _SMALL)
-    top = _LINE * len(lines) + 4.0
-    y = Scale(0.0, 1.0, top + _PLOT, top)
-    marks = [*word_lines(0.0, _LINE - 3.0, lines, "small", _LINE)]
-    marks.append(mark("words", x.end, _LINE - 3.0, level, "small", "end"))
+) -> Block:
+    """Return curves over an area or spikes, under words with a number at the right."""
+    marks, top = text_block(0.0, -2.0, words, _CELL - (0.0 if level is None else 36.0))
+    if level is not None:
+        marks.append(mark("words", x.end, 8.0, _short(level), "small", "end"))
+    y = Scale(0.0, 1.0, top + 4.0 + _PLOT, top + 4.0)
     dots = [(x.at(v), y.at(degree)) for v, degree in points]
-    if is_area and points:
-        ends = (dots[0][0], y.start), (dots[-1][0], y.start)
-        marks.append(mark("path", path_of([ends[0], *dots, ends[1]]), "filled"))
-    else:
+    if is_area and dots:
+        area = [(dots[0][0], y.start), *dots, (dots[-1][0], y.start)]
+        marks.append(mark("path", path_of(area), "filled"))
+    elif dots:
         marks += [mark("line", at, at, y.start, high, "line") for at, high in dots]
     marks.append(mark("line", x.start, x.end, y.start, y.start, "axis"))
-    for curve in curves:
-        marks.append(mark("path", polyline(curve, x, y), "curve"))
+    marks += [mark("path", polyline(curve, x, y), "curve") for curve in curves]
     if value is not None:
-        marks.append(mark("line", x.at(value), x.at(value), top - 2.0, y.start, "pin"))
-    return _Cell(marks, top + _PLOT + 4.0)
+        marks.append(
+            mark("line", x.at(value), x.at(value), y.end - 2.0, y.start, "pin")
+        )
+    return marks, y.start + 4.0
 
 
 def _propositions(

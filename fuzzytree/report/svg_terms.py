@@ -12,20 +12,22 @@ from fuzzytree.model import Document, SystemOutput, Variable, printable
 from fuzzytree.report.audit_rows import Data, histogram
 from fuzzytree.report.drawing import (
     Axis,
+    Block,
     Curve,
     Scale,
+    Sheet,
     axis_marks,
     axis_of,
     between,
-    lines_within,
+    listing,
     polyline,
     spread,
+    text_block,
     text_width,
-    word_lines,
 )
 from fuzzytree.report.markup import Markup, mark
 from fuzzytree.report.models import summands
-from fuzzytree.report.pictures import Picture, class_mark, picture
+from fuzzytree.report.pictures import Picture, class_mark
 from fuzzytree.report.text import number
 
 WIDE = 340.0
@@ -42,8 +44,7 @@ _MOST_ROWS = 3
 _BINS = 36
 _FONT = 11.0
 _ACROSS = 3  # variables beside each other in a picture of their own
-_GAP, _LINE = 12.0, 16.0
-_SMALL, _STRONG = 10.5, 14.0  # sizes of words
+_GAP = 12.0
 
 
 def scale_of(axis: Axis, data: Data | None) -> Scale:
@@ -90,11 +91,11 @@ def _terms_marks(
     named: Collection[str] | None = None,
     *,
     has_colours: bool = False,
-) -> tuple[list[Markup], float]:
-    """Return the marks of a picture of terms, and how high it is."""
+) -> Block:
+    """Return the marks of a picture of terms."""
     x = scale_of(axis, data)
     curves = axis.curves[:MOST_CURVES]
-    names, listing = _names_of(curves, x)
+    names, notes = _names_of(curves, x)
     top = 8.0 + _ROW * max((name.row + 1 for name in names), default=0)
     y = Scale(0.0, 1.0, top + _PLOT, top)
     marks = [*_bins(axis, data, x, y)]
@@ -114,10 +115,9 @@ def _terms_marks(
         marks.append(mark("path", diamond, "witness"))
     marks += axis_marks(x, y.start)
     rest = len(axis.curves) - len(curves)
-    listing += [f"{rest} not drawn"] if rest else []
-    lines = lines_within(listing, WIDE - 2 * _LEFT, _SMALL)
-    marks += word_lines(_LEFT, y.start + 32.0, lines, "small", _ROW)
-    return marks, y.start + 22.0 + _ROW * len(lines)
+    notes += [f"{rest} not drawn"] if rest else []
+    words, high = text_block(_LEFT, y.start + 22.0, notes, WIDE - 2 * _LEFT)
+    return [*marks, *words], y.start + 22.0 + high
 
 
 def _svg(axis: Axis, marks: list[Markup], high: float, name: str) -> Markup:
@@ -134,68 +134,46 @@ def draw_terms(model: Document, *, title: str | None = None) -> Picture:
 
     Where names of terms do not fit above their curves, numbers stand there, and the
     names below.
-
-    Args:
-        model: The model.
-        title: Above the picture; by default the model's name.
-
-    Raises:
-        ValueError: If the model has no terms that are curves.
-
-    Example:
-        >>> from fuzzytree.testing import random_system
-        >>> draw_terms(random_system(2)).svg.startswith("<svg")
-        True
     """
     variables: list[Variable | SystemOutput] = [*model.variables, *model.outputs]
-    axes = [*zip(map(axis_of, variables), variables, strict=True)]
-    axes = [(axis, own) for axis, own in axes if axis.curves or axis.undrawn]
-    if not axes:
+    cards = [_card(one, f"v{k}") for k, one in enumerate(variables) if one.terms]
+    if not cards:
         raise ValueError(f"{model.name} has no terms that are curves")
-    heading = f"The terms of {model.name}" if title is None else title
     step = WIDE + 2 * _GAP
-    wide = step * min(len(axes), _ACROSS)
-    lines = lines_within(heading, wide - 2 * _GAP, _STRONG)
-    marks = [*word_lines(_GAP, 20.0, lines, "strong", 17.0)]
-    top = high = 17.0 * len(lines) + 8.0
-    for place, (axis, variable) in enumerate(axes):
-        column = place % _ACROSS
-        top = high if not column else top
-        names = lines_within(axis.title, WIDE, _STRONG)
-        notes = [*_note_lines(variable, axis)]
-        card = [*word_lines(0.0, _LINE, names, "strong", _LINE)]
-        below = _LINE * len(names)
-        card += word_lines(0.0, below + _LINE, notes, "small", _LINE)
-        below += _LINE * (len(notes) + 0.5)
-        if axis.curves:
-            inner, size = _terms_marks(axis, None, has_colours=True)
-            picture_of = _svg(axis, inner, size, f"v{place}")
-            card.append(mark("group", [picture_of], move=f"translate(0 {below:.1f})"))
-            below += size
-        move = f"translate({column * step + _GAP:.0f} {top + _GAP:.1f})"
-        marks.append(mark("group", card, move=move))
-        high = max(high, top + below + 2 * _GAP)
-    return picture(marks, wide, high, heading)
+    heading = f"The terms of {model.name}" if title is None else title
+    sheet = Sheet(step * min(len(cards), _ACROSS) - 2 * _GAP, heading)
+    for first in range(0, len(cards), _ACROSS):
+        sheet.row(cards[first : first + _ACROSS], step)
+    return sheet.picture("A curve for each term: degrees from 0 to 1 over the values")
 
 
-def _note_lines(variable: Variable | SystemOutput, axis: Axis) -> Iterator[str]:
-    """Yield what a picture of terms does not show."""
-    words = [f"{place} is {name}" for place, name in enumerate(variable.categories)]
-    texts = [", ".join(words)] if words else []
-    if axis.undrawn:
-        texts.append(f"not drawn: {', '.join(axis.undrawn)}")
-    for text in texts:
-        yield from lines_within(text, WIDE, _SMALL)
-    yield from sum_lines(variable, WIDE, _SMALL)
+def _card(variable: Variable | SystemOutput, name: str) -> Block:
+    """Return the terms of a variable under its name, and what these do not show."""
+    axis = axis_of(variable)
+    categories = [
+        f"{place} is {text}" for place, text in enumerate(variable.categories)
+    ]
+    undrawn = f"not drawn: {', '.join(axis.undrawn)}" if axis.undrawn else ""
+    notes = [", ".join(categories), undrawn, sum_words(variable)]
+    marks, top = text_block(0.0, _GAP, axis.title, WIDE, "strong")
+    top += _GAP
+    for note in notes:
+        words, high = text_block(0.0, top, note, WIDE)
+        marks, top = marks + words, top + high
+    if axis.curves:
+        inner, high = _terms_marks(axis, None, has_colours=True)
+        terms = _svg(axis, inner, high, name)
+        marks.append(mark("group", [terms], move=f"translate(0 {top + 4.0:.1f})"))
+        top += high
+    return marks, top + _GAP
 
 
-def sum_lines(variable: Variable | SystemOutput, wide: float, size: float) -> list[str]:
-    """Return what a combination is, in lines that fit a width; none of an input."""
+def sum_words(variable: Variable | SystemOutput) -> list[str]:
+    """Return what a combination is, in words that stay together; none of an input."""
     if not variable.parts:
         return []
     first, *others = summands(variable.parts)
-    first = f"{variable.name} = {first.removeprefix('+ ')}"
-    return lines_within([first, *others], wide, size)
+    return [f"{variable.name} = {first.removeprefix('+ ')}", *others]
 
 
 def _curves(
@@ -266,8 +244,8 @@ def _names_of(curves: Sequence[Curve], x: Scale) -> tuple[list[_Name], list[str]
         return names, []
     order = [k for _, k in middles]
     numbers = [(str(n), top, k) for n, (top, k) in enumerate(middles, 1)]
-    listing = [f"{n} {curves[k].name}" for n, k in enumerate(order, 1)]
-    return _rows_of(numbers, x), [f"{text}," for text in listing[:-1]] + listing[-1:]
+    texts = [f"{n} {curves[k].name}" for n, k in enumerate(order, 1)]
+    return _rows_of(numbers, x), listing(texts, ",")
 
 
 def _rows_of(texts: Sequence[tuple[str, float, int]], x: Scale) -> list[_Name]:

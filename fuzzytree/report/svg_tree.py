@@ -8,11 +8,11 @@ import msgspec
 
 from fuzzytree.model import Document, Node
 from fuzzytree.report.audit_rows import Counts, Passing
-from fuzzytree.report.drawing import legend, lines_within, text_width, word_lines
+from fuzzytree.report.drawing import EDGE, LOOKS, Sheet, legend, text_block, text_width
 from fuzzytree.report.markup import Markup, mark
 from fuzzytree.report.models import taken
-from fuzzytree.report.pictures import Picture, class_mark, picture
-from fuzzytree.report.svg_terms import sum_lines
+from fuzzytree.report.pictures import Picture, class_mark
+from fuzzytree.report.svg_terms import sum_words
 from fuzzytree.report.text import counted
 
 MOST_LEAVES = 200
@@ -20,11 +20,13 @@ MOST_LEAVES = 200
 
 _LEAST_WIDE, _MOST_WIDE = 100.0, 230.0  # of a box, in points; longer words are wrapped
 _ACROSS, _DOWN = 44.0, 11.0  # between boxes
-_EDGE, _INSIDE = 8.0, 10.0  # around a picture, and around the words of a box
-_TITLE, _NOTE = 14.0, 10.5  # sizes of words
-_LINE = 13.0  # of small words
+_INSIDE = 10.0  # around the words of a box
 _LEAST, _MOST = 1.5, 9.0  # points: how thick a branch is
 _MOST_CLASSES = 3  # whose rows a leaf names
+_ABOUT = (
+    "From left to right: each box tests one variable, each branch takes a part of "
+    "its values, and each rounded box is a class"
+)
 
 
 class Box(msgspec.Struct):
@@ -45,29 +47,17 @@ class Box(msgspec.Struct):
     left: float = 0.0
     top: float = 0.0
     wide: float = 0.0
+    lead: float = 0.0  # the height of the words of its branch
+    high: float = 0.0
     span: float = 0.0
+    marks: list[Markup] = []
     above: Box | None = None
-    below: list[Box] = msgspec.field(default_factory=lambda: [])
-
-    @property
-    def lines(self) -> tuple[list[str], list[str], list[str]]:
-        """The lines of its title, of the note below, and of the branch above it."""
-        inside = self.wide - 2 * _INSIDE
-        title = lines_within(self.title, inside, _TITLE)
-        note = lines_within(self.note, inside, _NOTE)
-        return title, note, lines_within(self.branch, self.wide, _NOTE)
-
-    @property
-    def high(self) -> float:
-        """How high it is, without the branch above it."""
-        title, note, _ = self.lines
-        bar = _LINE if self.counts else 0.0
-        return 16.0 * len(title) + _LINE * len(note) + bar + 9.0
+    below: list[Box] = []
 
     @property
     def middle(self) -> float:
-        """How far its middle is from the top of the picture."""
-        return self.top + self.high / 2.0
+        """How far its middle is from the top of the tree."""
+        return self.top + self.lead + self.high / 2.0
 
 
 def tree_picture(tree: Document, rows: Passing | None) -> Markup:
@@ -77,30 +67,18 @@ def tree_picture(tree: Document, rows: Passing | None) -> Markup:
     is that of the training rows, where their classes are known. A branch is the
     thicker the more rows take it.
     """
-    drawn, wide, high = _tree_marks(boxes_of(tree, rows))
+    marks, wide, high = _tree_marks(boxes_of(tree, rows))
     title = f"The tree {_size_text(tree)}"
-    return mark("svg", wide, high, "tree", title, _ABOUT, drawn)
-
-
-_ABOUT = (
-    "From left to right: each box tests one variable, each branch takes a part of "
-    "its values, and each rounded box is a class"
-)
+    marks = [mark("group", marks, move=f"translate({EDGE} {EDGE})")]
+    return mark("svg", wide + 2 * EDGE, high + 2 * EDGE, "tree", title, _ABOUT, marks)
 
 
 def draw_tree(tree: Document, *, title: str | None = None) -> Picture:
-    """Draw a tree: the variable of each node, the terms of its branches, the classes.
+    """Draw a tree of at most `MOST_LEAVES` leaves, all names whole.
 
     A box shows how many training rows reached it, and a bar of these by class; where
     that is known of all leaves, a branch is the thicker the more rows took it. Below
-    the tree stand the combinations of variables that nodes test. All names are whole.
-
-    Args:
-        tree: At most `MOST_LEAVES` leaves.
-        title: Above the picture; by default the name and size of the tree.
-
-    Raises:
-        ValueError: If the tree has more leaves than that.
+    the tree stand the combinations of variables that nodes test.
     """
     if len(tree.leaves) > MOST_LEAVES:
         raise ValueError(
@@ -108,32 +86,22 @@ def draw_tree(tree: Document, *, title: str | None = None) -> Picture:
             f"{len(tree.leaves)}; learn a smaller tree, or read its rules"
         )
     boxes = boxes_of(tree, None)
-    drawn, wide, high = _tree_marks(boxes)
+    marks, wide, high = _tree_marks(boxes)
     title = _size_text(tree) if title is None else title
-    wide = max(wide, min(text_width(title, _TITLE) + 2 * _EDGE, 2 * _MOST_WIDE))
-    inside = wide - 2 * _EDGE
-    heading = lines_within(title, inside, _TITLE)
-    marks = [*word_lines(_EDGE, 20.0, heading, "strong", 17.0)]
-    top = 17.0 * len(heading) + 8.0
+    least = min(text_width(title, LOOKS["strong"][0]), 2 * _MOST_WIDE)
+    sheet = Sheet(max(wide, least), title)
     if boxes[0].counts:
         signs = [
             (mark("rect", 0, -9, 18, 9, f"bar {class_mark(code)}"), f"rows of {label}")
             for code, label in enumerate(tree.classes)
         ]
-        keys, below = legend(signs, _EDGE, top, inside)
-        marks, top = marks + keys, top + below
-    marks.append(mark("group", drawn, move=f"translate(0 {top:.1f})"))
-    used = {node.variable for node in tree.nodes}
-    notes = [
-        line
-        for variable in tree.variables
-        if variable.name in used
-        for line in sum_lines(variable, inside, _NOTE)
-    ]
-    marks += word_lines(_EDGE, top + high + _LINE, notes, "small", _LINE)
-    return picture(
-        marks, wide, top + high + _LINE * (len(notes) + 1), title, "", _ABOUT
-    )
+        sheet.row([legend(signs, sheet.inside)])
+    sheet.row([(marks, high + _DOWN)])
+    names = {node.variable for node in tree.nodes}
+    for variable in tree.variables:
+        if variable.name in names:
+            sheet.words(sum_words(variable))
+    return sheet.picture(_ABOUT)
 
 
 def _size_text(tree: Document) -> str:
@@ -144,10 +112,16 @@ def _size_text(tree: Document) -> str:
 def _tree_marks(boxes: Sequence[Box]) -> tuple[list[Markup], float, float]:
     """Return boxes with their branches, and the width and height of all."""
     arrange(boxes)
-    wide = max(box.left + box.wide for box in boxes) + _EDGE
+    wide = max(box.left + box.wide for box in boxes)
     whole = boxes[0].rows or 0
-    drawn = [_branch(box, whole) for box in boxes if box.above is not None]
-    return [*drawn, *map(_box_marks, boxes)], wide, boxes[0].span + 2 * _EDGE
+    marks = [_branch(box, whole) for box in boxes if box.above is not None]
+    for box in boxes:
+        counts = ", ".join(map(str, box.counts))
+        counts = f"rows by class: {counts}" if counts else ""
+        about = "; ".join(filter(None, [box.branch, box.title, box.note, counts]))
+        move = f"translate({box.left:.1f} {box.top:.1f})"
+        marks.append(mark("group", box.marks, about, move))
+    return marks, wide, boxes[0].span - _DOWN
 
 
 def boxes_of(tree: Document, rows: Passing | None) -> list[Box]:
@@ -214,26 +188,42 @@ def arrange(boxes: Sequence[Box]) -> None:
 
     A level is as wide as its words, within bounds; in these words are wrapped.
     """
-    left = _EDGE
+    left = 0.0
     for level in range(max(box.level for box in boxes) + 1):
         column = [box for box in boxes if box.level == level]
-        sizes = [_LEAST_WIDE]
+        wide = _LEAST_WIDE
         for box in column:
-            inside = text_width(box.title, _TITLE), text_width(box.note, _NOTE)
-            sizes += [max(inside) + 2 * _INSIDE, text_width(box.branch, _NOTE)]
+            words = {"strong": box.title, "small": box.note}
+            sizes = [text_width(text, LOOKS[look][0]) for look, text in words.items()]
+            branch = text_width(box.branch, LOOKS["small"][0])
+            wide = max(wide, branch, max(sizes) + 2 * _INSIDE)
         for box in column:
-            box.left, box.wide = left, min(max(sizes), _MOST_WIDE)
+            box.left, box.wide = left, min(wide, _MOST_WIDE)
+            _fill(box)
         left += column[0].wide + _ACROSS
     for box in reversed(boxes):
-        own = _LINE * len(box.lines[2]) + box.high + _DOWN
-        box.span = max(own, sum(below.span for below in box.below))
-    boxes[0].top = _EDGE
+        spans = [below.span for below in box.below]
+        box.span = max(box.lead + box.high + _DOWN, sum(spans))
     for box in boxes:  # at first `top` is where what it takes begins
         start = box.top + (box.span - sum(below.span for below in box.below)) / 2.0
         for below in box.below:
             below.top, start = start, start + below.span
-        words = _LINE * len(box.lines[2])
-        box.top += (box.span - words - box.high - _DOWN) / 2.0 + words
+        box.top += (box.span - box.lead - box.high - _DOWN) / 2.0
+
+
+def _fill(box: Box) -> None:
+    """Make the marks of a box of known width, below the words of its branch."""
+    own = "" if box.code is None else f" {class_mark(box.code)}"
+    inside = box.wide - 2 * _INSIDE
+    branch, high = text_block(2.0, 0.0, box.branch, box.wide)
+    box.lead = high + 3.0 if branch else 0.0
+    title, high = text_block(_INSIDE, box.lead + 4.0, box.title, inside, f"strong{own}")
+    note, more = text_block(_INSIDE, box.lead + high + 3.0, box.note, inside)
+    under = box.lead + high + more + 6.0
+    bar = [*_bar(box.counts, _INSIDE, under, inside)]
+    box.high = under - box.lead + (12.0 if bar else 3.0)
+    edge = mark("rect", 0, box.lead, box.wide, box.high, f"box{own}", 14 if own else 4)
+    box.marks = [edge, *branch, *title, *note, *bar]
 
 
 def _branch(box: Box, whole: int) -> Markup:
@@ -246,26 +236,6 @@ def _branch(box: Box, whole: int) -> Markup:
     way += f"{bend:.1f} {box.middle:.1f} {end:.1f} {box.middle:.1f}"
     thick = _LEAST + (_MOST - _LEAST) * share
     return mark("branch", way, thick)
-
-
-def _box_marks(box: Box) -> Markup:
-    title, note, branch = box.lines
-    left, top, inside = box.left, box.top, box.wide - 2 * _INSIDE
-    own = "" if box.code is None else f" {class_mark(box.code)}"
-    counts = ", ".join(map(str, box.counts))
-    counts = f"rows by class: {counts}" if counts else ""
-    about = "; ".join(filter(None, [box.branch, box.title, box.note, counts]))
-    under = top + 16.0 * len(title)
-    base = top - 6.0 - _LINE * (len(branch) - 1)
-    bar_top = under + _LINE * len(note) + 7.0
-    marks = [
-        mark("rect", left, top, box.wide, box.high, f"box{own}", 14.0 if own else 4.0),
-        *word_lines(left + 2, base, branch, "small", _LINE),
-        *word_lines(left + _INSIDE, top + 18.0, title, f"strong{own}", 16.0),
-        *word_lines(left + _INSIDE, under + _LINE + 2.0, note, "small", _LINE),
-        *_bar(box.counts, left + _INSIDE, bar_top, inside),
-    ]
-    return mark("group", marks, about)
 
 
 def _bar(counts: Counts, left: float, top: float, wide: float) -> Iterator[Markup]:

@@ -16,7 +16,7 @@ def test_a_dot_stands_at_the_mean_claim_and_the_share_that_is_right() -> None:
     svg = ft.draw_reliability(SHARES, [0, 1, 1, 1]).svg
     dots = re.findall(r'<rect x="([\d.]+)" y="([\d.]+)"[^>]*class="dot"', svg)
     # bins from 0.5 (two rows, one right), 0.8 (one row, wrong) and 0.9 (one, right)
-    assert [(round(float(x) + 3 - 46), round(316 - float(y) - 3)) for x, y in dots] == [
+    assert [(round(float(x) + 3 - 74), round(316 - float(y) - 3)) for x, y in dots] == [
         (round(260 * 0.55), 130),
         (round(260 * 0.85), 0),
         (round(260 * 0.95), 260),
