@@ -105,6 +105,14 @@ def test_categories_and_whole_numbers_are_what_they_are() -> None:
     assert (input_of(html, "count")["step"], input_of(html, "count")["start"]) == (1, 5)
 
 
+def test_an_input_of_a_tree_that_no_node_tests_is_in_its_page() -> None:
+    tree = random_tree(1, combinations=0)
+    tree = replace(tree, columns=(), variables=(Variable("idle"), *tree.variables))
+    html = what_if_page(tree).html
+    assert input_of(html, "idle")["start"] == 0.5
+    assert 'const INPUTS = [\n  "idle",' in html
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_lines_between_the_points_of_a_term_are_near_its_degrees(seed: int) -> None:
     system = random_system(seed)

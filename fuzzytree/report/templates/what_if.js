@@ -116,10 +116,12 @@ const order = (strengths) => strengths.map((_, k) => k).sort((a, b) => (strength
 
 const MANY = 10; // terms; of more, those of the winning rule are shown
 const across = (one, x) => 300 * ((x - one.from) / (one.to - one.from));
-const pin = (one, x, high) => draw("line", { class: "pin", x1: min(300, max(0, across(one, x))), x2: min(300, max(0, across(one, x))), y1: -2, y2: high });
+const upright = (look, x, y1, y2, ...parts) => (x >= 0 && x <= 300 ? [draw("line", { class: look, x1: x, x2: x, y1, y2 }, ...parts)] : []);
+const pin = (one, x, high) => upright("pin", across(one, x), -2, high);
+const dots = (one, high, points) => points.map(([x, y]) => `${across(one, x).toFixed(1)},${(high * (1 - min(1, y))).toFixed(1)}`).join(" ");
 const picture = (one, high) => draw("svg", { viewBox: `0 -2 300 ${high + 4}`, preserveAspectRatio: "none", "aria-hidden": "true" },
   draw("line", { class: "axis", x1: 0, x2: 300, y1: high, y2: high }),
-  ...one.terms.map(({ points = [] }) => draw("polyline", { class: "curve", points: points.map(([x, y]) => `${across(one, x).toFixed(1)},${(high * (1 - y)).toFixed(1)}`).join(" ") })));
+  ...one.terms.map((term) => draw("polyline", { class: "curve", points: dots(one, high, term.points ?? []) })));
 const set = (k, value) => { values[k] = value; later(); };
 const cards = variables.map((one) => {
   const k = inputs.indexOf(one), card = { labels: one.terms.map((term) => make("li", {}, named(term.name), " ", make("b"))) };
@@ -164,16 +166,19 @@ const showInputs = (found, winner) => variables.forEach((one, k) => {
   card.terms.replaceChildren(...card.labels.filter((_, j) => isFew || used.includes(one.terms[j].name)));
   if (!isFew) card.terms.append(make("li", {}, `of ${one.terms.length} terms`));
   card.svg?.querySelector(".pin")?.remove();
-  if (Number.isFinite(x)) card.svg?.append(pin(one, x, 56));
+  card.svg?.append(...pin(one, x, 56));
 });
 
 /* --- the answer */
 
-const REMARKS = ["", "a tie: the first of the strongest rules decides", "no rule fires", "a value is missing"];
+const REMARKS = ["", "a tie: the first of the strongest rules decides",
+  outputs.length ? "no rule concludes an output" : "no rule fires", "a value is missing"];
 const showAnswer = (answer, strengths, found) => {
   const code = classes.indexOf(answer.label);
-  const lines = outputs.map((one, k) => make("span", { title: String(answer.outputs[k]) }, named(one.name), ` ${plain(answer.outputs[k])}`, make("small", {}, one.unit)));
-  if (!outputs.length) lines.push(make("span", {}, code < 0 ? "no class" : label(code), make("small", {}, code < 0 ? "" : fixed(answer.probabilities?.[code] ?? strengths[answer.rule - 1]))));
+  const lines = outputs.map((one, k) =>
+    make("span", { title: String(answer.outputs[k]) }, named(one.name), ` ${plain(answer.outputs[k])}`, make("small", {}, one.unit)));
+  const share = code < 0 ? "" : fixed(answer.probabilities?.[code] ?? strengths[answer.rule - 1]);
+  if (!outputs.length) lines.push(make("span", {}, code < 0 ? "no class" : label(code), make("small", {}, share)));
   if (REMARKS[answer.status]) lines.push(make("small", {}, REMARKS[answer.status]));
   if ($("answer").textContent !== lines.map((line) => line.textContent).join("")) $("answer").replaceChildren(...lines);
   $("shapes").replaceChildren(...(outputs.length ? outputs.map((one, k) => shape(one, k, answer, found)) : [bars(answer, strengths)]));
@@ -182,8 +187,9 @@ const bars = (answer, strengths) => {
   const heights = answer.probabilities ?? classes.map((name) => max(0, ...strengths.filter((_, k) => rules[k].then === name)));
   const ranked = heights.length > 12 ? order(heights).slice(0, 12) : heights.map((_, k) => k);
   const list = ranked.map((code) => make("li", {}, label(code), painted(bar(heights[code]), code), make("span", {}, fixed(heights[code]))));
-  const caption = answer.probabilities ? "Probability of each class" : "Strongest rule of each class";
-  return make("div", {}, make("p", { class: "quiet" }, caption + (classes.length > 12 ? `; the 12 highest of ${classes.length}` : "")), make("ul", { class: "bars" }, ...list));
+  const of = classes.length > 12 ? `; the 12 highest of ${classes.length}` : "";
+  const caption = (answer.probabilities ? "Probability of each class" : "Strongest rule of each class") + of;
+  return make("div", {}, make("p", { class: "quiet" }, caption), make("ul", { class: "bars" }, ...list));
 };
 const shape = (one, place, answer, found) => { // what the rules conclude of an output
   const high = 90, svg = picture(one, high), isWeighted = one.defuzzifier.method.startsWith("weighted");
@@ -196,19 +202,20 @@ const shape = (one, place, answer, found) => { // what the rules conclude of an 
   });
   for (const [term, strength] of fired) {
     const x = across(one, term.weights ? term.weights.reduce((sum, w, k) => sum + w * found[inputs[k].name], term.offset) : term.value ?? NaN);
-    if (x >= 0 && x <= 300) svg.append(draw("line", { class: "stick", x1: x, x2: x, y1: high, y2: high * (1 - min(1, strength)) }, draw("title", {}, term.name)));
+    svg.append(...upright("stick", x, high, high * (1 - min(1, strength)), draw("title", {}, term.name)));
   }
   if (!isWeighted && fired.length) {
     const join = OR[one.aggregation ?? "maximum"];
-    const dots = Array.from({ length: 151 }, (_, k) => {
+    const points = Array.from({ length: 151 }, (_, k) => {
       const x = one.from + ((one.to - one.from) * k) / 150;
-      return `${2 * k},${(high * (1 - min(1, fired.reduce((sum, [term, strength, cut]) => join(sum, cut(strength, degree(term, x) || 0)), 0)))).toFixed(1)}`;
-    }).join(" ");
-    svg.append(draw("polygon", { class: "area", points: `0,${high} ${dots} 300,${high}` }), draw("polyline", { class: "curve lit", points: dots }));
+      return [x, fired.reduce((sum, [term, strength, cut]) => join(sum, cut(strength, degree(term, x) || 0)), 0)];
+    });
+    svg.append(draw("polygon", { class: "area", points: `0,${high} ${dots(one, high, points)} 300,${high}` }),
+      draw("polyline", { class: "curve lit", points: dots(one, high, points) }));
   }
-  if (Number.isFinite(answer.outputs[place])) svg.append(pin(one, answer.outputs[place], high));
-  const ends = new Map(fired.map(([term, strength]) => [term.name, max(strength, ...fired.filter(([other]) => other === term).map(([, s]) => s))]));
-  const about = [...ends].sort((a, b) => b[1] - a[1]).slice(0, 4).map(([name, strength]) => `${name} ${fixed(strength)}`).join(", ") || "no rule concludes it";
+  svg.append(...pin(one, answer.outputs[place], high));
+  const ranked = fired.sort((a, b) => b[1] - a[1]).filter(([term], k, all) => all.findIndex(([other]) => other === term) === k);
+  const about = ranked.slice(0, 4).map(([term, strength]) => `${term.name} ${fixed(strength)}`).join(", ") || "no rule concludes it";
   return make("figure", { class: "shape" }, make("figcaption", {}, named(`${one.name}: ${about}`)), svg,
     make("div", { class: "ends" }, make("span", {}, plain(one.from)), make("span", {}, plain(one.to))));
 };
@@ -225,7 +232,8 @@ const distance = (one, is, x) => { // from the nearest cut of a term of a tree
 const reasons = (rule, found) => propositions(rule.when).map((is) => {
   const one = find(variables, is.variable);
   if (!one) return { text: text(is), degree: NaN, value: "as far as it is concluded" };
-  const sums = shares(one, found).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1])).map(([name, share]) => `${name} ${share < 0 ? "−" : "+"}${plain(Math.abs(share), 4)}`);
+  const sums = shares(one, found).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]))
+    .map(([name, share]) => `${name} ${share < 0 ? "−" : "+"}${plain(Math.abs(share), 4)}`);
   const more = sums.length > 4 ? [`${sums.length - 3} more`] : [];
   return { text: text(is), degree: truth(is, found), value: `value ${shown(one, found[one.name])}` + distance(one, is, found[one.name]),
     sums: sums.slice(0, sums.length > 4 ? 3 : 4).concat(more).join(", ") };
@@ -237,7 +245,7 @@ const showWhy = (answer, strengths, found) => {
     return;
   }
   const { support, then } = rules[first], next = ranked.find((k) => k !== first && (outputs.length || rules[k].then !== then));
-  const seen = support === undefined ? "." : `; ${support} training rows reach it.`;
+  const seen = support === undefined ? "." : `; ${support} training ${support === 1 ? "row reaches" : "rows reach"} it.`;
   const said = outputs.length ? [`Rule ${first + 1} takes part most, ${fixed(strengths[first])}; ${ranked.length} of ${rules.length} fire.`]
     : [`Rule ${first + 1} decides for `, named(then), ` as the strongest, ${fixed(strengths[first])}${seen}`];
   const parts = [make("p", {}, ...said), make("ul", {}, ...reasons(rules[first], found).map((is) => make("li", {}, named(is.text),
@@ -245,7 +253,8 @@ const showWhy = (answer, strengths, found) => {
   if (next !== undefined) {
     const low = reasons(rules[next], found).reduce((a, b) => (a && !(b.degree < a.degree) ? a : b), null);
     const isAll = low?.degree < 1 && !JSON.stringify(rules[next].when).includes('"type":"or"');
-    parts.push(make("p", { class: "quiet" }, `Runner-up: rule ${next + 1}`, ...(outputs.length ? [] : [" for ", named(rules[next].then)]), `, ${fixed(strengths[next])}`,
+    const whose = outputs.length ? [] : [" for ", named(rules[next].then)];
+    parts.push(make("p", { class: "quiet" }, `Runner-up: rule ${next + 1}`, ...whose, `, ${fixed(strengths[next])}`,
       ...(isAll ? [", kept back by ", named(low.text), ` (${fixed(low.degree)}): `, named(low.value)] : []), "."));
   }
   $("why").replaceChildren(...parts);
@@ -275,6 +284,7 @@ const showRules = (answer, strengths) => {
   const current = [...$("rules").children];
   if (wanted.length !== current.length || wanted.some((item, k) => item !== current[k])) $("rules").replaceChildren(...wanted);
   $("sort").setAttribute("aria-pressed", isSorted);
+  $("more").setAttribute("aria-expanded", isWhole);
   $("more").textContent = isWhole ? `Show ${FEW}` : `Show all ${rules.length}`;
 };
 $("sort").addEventListener("click", () => { isSorted = !isSorted; later(); });
@@ -350,7 +360,8 @@ const colour = (canvas, numbers, codes, output) => {
   });
   context.putImageData(image, 0, 0);
   const seen = [...new Set(codes)].filter((code) => code >= 0).sort((x, y) => x - y);
-  $("legend").replaceChildren(...(output ? [plain(low), make("span", { class: "ramp" }), plain(high), quiet(named(output.name))] : seen.slice(0, 30).map(label)));
+  const ramp = () => [plain(low), make("span", { class: "ramp" }), plain(high), quiet(named(output.name))];
+  $("legend").replaceChildren(...(output ? ramp() : seen.slice(0, 30).map(label)));
 };
 $("plot").addEventListener("click", (event) => {
   const box = $("canvas").getBoundingClientRect();
@@ -371,7 +382,8 @@ const startRows = () => {
   };
   box.addEventListener("change", () => move(0));
   const of = rows.length < facts.total ? `of the first ${rows.length} of ${facts.total} rows` : `of ${rows.length} rows`;
-  if (rows.length) $("rows").append(quiet("Row"), button("‹", () => move(-1), { "aria-label": "Row before" }), box, button("›", () => move(1), { "aria-label": "Next row" }), quiet(of));
+  const turn = (sign, by, title) => button(sign, () => move(by), { "aria-label": title });
+  if (rows.length) $("rows").append(quiet("Row"), turn("‹", -1, "Row before"), box, turn("›", 1, "Next row"), quiet(of));
   $("rows").append(button("Reset", () => inputs.forEach((one, k) => set(k, one.start))));
 };
 const readAddress = () => {
@@ -408,7 +420,8 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", later);
 const wrong = model.selfTest();
 $("warning").hidden = !wrong.length;
 $("warning").textContent = `This browser computes other numbers than fuzzytree: ${wrong[0]?.slice(0, 300)}`;
-$("checked").textContent = wrong.length ? "" : `Its program is that of fuzzytree export --to javascript; the self-test passed in this browser. Fingerprint ${facts.fingerprint.slice(0, 12)}.`;
+const about = "Its program is that of `fuzzytree export --to javascript`; the self-test passed in this browser.";
+$("checked").textContent = wrong.length ? "" : `${about} Fingerprint ${facts.fingerprint.slice(0, 12)}.`;
 $("proof").hidden = !inputs.length;
 startRows();
 startSurface();
