@@ -185,6 +185,15 @@ def test_a_session_is_copied_without_its_prompts_and_output() -> None:
     assert HOOKS["on_page_content"](output) == output
 
 
+def test_the_gallery_has_ten_pictures_and_each_has_a_command_or_a_guide() -> None:
+    sections = (DOCS / "gallery.md").read_text("utf-8").split("\n## ")[1:]
+    shown = [section for section in sections if "![" in section]
+    assert len(shown) >= 10
+    assert all(
+        "```" in text or "`--front`" in text or "](how-to" in text for text in shown
+    )
+
+
 def test_an_option_stays_on_one_line() -> None:
     html = HOOKS["on_page_content"]("<code>--front</code> <code>a-b</code>")
     assert html == '<code class="whole">--front</code> <code>a-b</code>'

@@ -15,6 +15,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -79,7 +80,7 @@ def test_no_example_prints_more_than_a_few_lines(page: Path) -> None:
 def test_the_wine_table_holds_the_numbers_of_scikit_learn() -> None:
     from sklearn.datasets import load_wine
 
-    wine = load_wine()
+    wine: Any = load_wine()
     with (ROOT / "examples" / "wine" / "wine.csv").open(encoding="utf-8") as file:
         head, *rows = csv.reader(file)
     grapes = ["barolo", "grignolino", "barbera"]
