@@ -58,5 +58,5 @@ def command(options: PageOptions) -> None:
     rows = f"{counted(page.rows, 'row')}, " if page.total else ""
     if page.rows < page.total:
         rows = f"the first {page.rows} of {page.total} rows, "
-    facts = f"{rows}{len(page.html) / 1000:.0f} kB; open it in a browser"
+    facts = f"{rows}{len(page.html.encode()) / 1000:.0f} kB; open it in a browser"
     say_rows(("wrote", options.output, facts), quiet=options.quiet)

@@ -25,7 +25,7 @@ def test_a_page_is_written_and_its_size_is_reported(
     assert main(["page", model, "-o", "tree.html"]) == 0
     content = Path("tree.html").read_text("utf-8")
     assert '"command":"fuzzytree why tree.yaml"' in content
-    size = f"{len(content) / 1000:.0f} kB"
+    size = f"{len(content.encode()) / 1000:.0f} kB"
     message = f"wrote    tree.html {size}; open it in a browser\n"
     assert capsys.readouterr().err == message
 

@@ -46,7 +46,7 @@ const parsed = (one, text) => {
 const unit = (one) => (one.unit && !one.date ? ` ${one.unit}` : "");
 const shown = (one, x) => (one.categories?.length || one.date ? cell(one, x) : plain(x)) + unit(one);
 const painted = (made, code) => { made.style.setProperty("--k", `var(--c${code % 10})`); return made; };
-const label = (code) => make("span", {}, painted(make("span", { class: "chip" }), code), named(classes[code]));
+const label = (code) => make("span", { class: "class" }, painted(make("span", { class: "chip" }), code), named(classes[code]));
 const bar = (share) => {
   const strip = make("span", { class: "strip", "aria-hidden": "true" }, make("span"));
   strip.firstChild.style.width = `${100 * min(1, share || 0)}%`;
