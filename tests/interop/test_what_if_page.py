@@ -13,6 +13,7 @@ from urllib.parse import quote
 import numpy as np
 import pandas
 import pytest
+from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.model import Document
@@ -221,6 +222,18 @@ def test_categories_are_chosen_by_name_and_a_missing_value_is_replaced(
         f"missing (as {one.categories[int(one.missing or 0)]})"
     )
     assert seen.errors() == []
+
+
+def test_whole_numbers_go_up_by_one(browser: Any, tmp_path: Path) -> None:
+    rules = rule_base()
+    inputs = tuple(replace(one, is_whole=True) for one in rules.variables)
+    seen = opened(browser, tmp_path, ft.page(replace(rules, variables=inputs)))
+    keys = import_module("selenium.webdriver.common.keys").Keys
+    for kind in ("range", "number"):
+        box = seen.browser.find_element("css selector", f"input[type={kind}]")
+        box.send_keys(keys.ARROW_UP)
+    command = "return document.getElementById('command').textContent"
+    wait_until(seen, lambda: seen.run(command).endswith(" pressure=7,area=50"))
 
 
 def test_a_click_on_the_surface_moves_there(browser: Any, tmp_path: Path) -> None:

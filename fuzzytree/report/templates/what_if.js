@@ -128,7 +128,7 @@ const cards = variables.map((one) => {
   if (k < 0) card.box = quiet();
   else if (one.categories.length) card.box = select(one.categories, { id: `v${k}` }, (place) => set(k, place));
   else {
-    card.box = make("input", { id: `v${k}`, type: one.date ? "date" : "number", step: one.date ? 1 : "any" });
+    card.box = make("input", { id: `v${k}`, type: one.date ? "date" : "number", step: one.date || one.is_whole ? 1 : "any" });
     card.box.addEventListener("input", () => { const x = parsed(one, card.box.value); if (Number.isFinite(x)) set(k, x); });
     card.slider = make("input", { type: "range", min: one.from, max: one.to, step: one.step, "aria-label": short(one.name) + unit(one) });
     card.slider.addEventListener("input", () => set(k, Number(card.slider.value)));
