@@ -32,6 +32,7 @@ from fuzzytree.runtimes.table import all_runtimes
 if TYPE_CHECKING:
     from mkdocs.structure.pages import Page
 
+WINE = Path(__file__).parents[1] / "examples" / "wine" / "wine.csv"
 MARK = re.compile(r"<!-- generated: (\w+) -->")
 CODE = re.compile(
     r'<div class="highlight">(?=<pre><span></span><code>(.*?)</code>)', re.DOTALL
@@ -79,7 +80,9 @@ def on_page_content(html: str, **_: object) -> str:
 
 
 def on_post_build(config: MutableMapping[str, str], **_: object) -> None:
-    """Write a page that leads on for each page that has moved."""
+    """Write a page that runs the wine tree, and one for each address that has moved."""
+    tree = fuzzytree.learn(WINE, target="cultivar", columns_per_node=1, leaves=4)
+    fuzzytree.page(tree, WINE).save(Path(config["site_dir"], "wine.html"))
     for old, new in MOVED.items():
         folder = Path(config["site_dir"], old)
         folder.mkdir(parents=True, exist_ok=True)

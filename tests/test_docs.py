@@ -199,8 +199,11 @@ def test_an_option_stays_on_one_line() -> None:
     assert html == '<code class="whole">--front</code> <code>a-b</code>'
 
 
-def test_a_page_that_has_moved_leads_to_the_new_one(tmp_path: Path) -> None:
+def test_the_site_has_a_model_to_try_and_leads_from_old_pages(
+    tmp_path: Path,
+) -> None:
     HOOKS["on_post_build"]({"site_dir": str(tmp_path)})
+    assert "flavanoids" in (tmp_path / "wine.html").read_text("utf-8")
     for old, new in HOOKS["MOVED"].items():
         assert f"url={new}" in (tmp_path / old / "index.html").read_text("utf-8")
         assert (DOCS / old / new).resolve().with_suffix(".md").exists()
