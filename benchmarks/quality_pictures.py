@@ -8,7 +8,15 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from quality_statistics import BINS, cliques, critical_difference
 
-from fuzzytree.report import LETTER, Markup, Picture, mark, picture, tick_words, ticks
+from fuzzytree.report import (
+    Markup,
+    Picture,
+    mark,
+    picture,
+    text_width,
+    tick_words,
+    ticks,
+)
 from fuzzytree.report.drawing import Scale, path_of
 from fuzzytree.report.pictures import class_mark
 
@@ -91,7 +99,7 @@ def accuracy_against_leaves(
     }
     taken = [(at - 5, at + 5, high + 4) for at, high in places.values() if at < x.end]
     for name, (at, height) in sorted(places.items(), key=lambda place: place[1][1]):
-        left, right = at + 8.0, at + 8.0 + 10.5 * LETTER * len(name)
+        left, right = at + 8.0, at + 8.0 + text_width(name, 11.0)
         base = next(
             height + 4.0 + shift
             for shift in sorted(range(-400, 401), key=abs)

@@ -5,8 +5,8 @@ from .audit import explanation_lines as explanation_lines
 from .audit_page import page as page
 from .bench import study_lines as study_lines
 from .diff import diff_lines as diff_lines
-from .drawing import LETTER as LETTER
 from .drawing import cut as cut
+from .drawing import text_width as text_width
 from .drawing import tick_words as tick_words
 from .drawing import ticks as ticks
 from .formats import ability_lines as ability_lines

@@ -152,7 +152,7 @@ def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
                 span=region.get(axis.name),
                 value=values.get(axis.name),
                 named={one.term for one in answer.terms if one.variable == axis.name},
-            ),
+            )[0],
         )
         for k, axis in enumerate(shown[:_MOST_BARS])
     ]

@@ -85,7 +85,7 @@ def _cards(
             lines.append(f"{axis.name} = {said}")
         if axis.undrawn:
             lines.append(f"not drawn: {', '.join(axis.undrawn)}")
-        yield axis, terms_picture(axis, data, f"{name}{place}"), lines
+        yield axis, terms_picture(axis, data, f"{name}{place}")[0], lines
 
 
 def rules_section(

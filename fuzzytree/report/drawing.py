@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from fractions import Fraction
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
+from types import MappingProxyType
 from typing import NamedTuple
 
 from fuzzytree.auditing import Domain
 from fuzzytree.model import (
-    LR,
-    Band,
     Document,
     Formula,
     Linear,
     Part,
-    Points,
-    Shape,
     SystemOutput,
     Term,
     Variable,
     printable,
 )
-from fuzzytree.model import Curve as SystemCurve
-from fuzzytree.numerics import exact_degree
 from fuzzytree.report.markup import Markup, mark, trimmed
 from fuzzytree.report.pictures import Picture, picture
 from fuzzytree.semantics import curve_degree
-
-LETTER = 0.58
-"""How wide a letter of a picture is on average, in sizes of its font."""
 
 EDGE = 12.0
 """Points around what a sheet holds."""
@@ -46,7 +37,7 @@ Block = tuple[list[Markup], float]
 
 _STEPS = 72  # at which a curve is evaluated, beside its corners
 _CORNERS = 160  # of one curve that are drawn exactly
-_KEPT = 1024  # degrees of one curve
+_KEPT = 1024  # letters
 _NARROW = "fijlrtI.,:;'|!()[] -"
 _FLAT = 0.04  # points of a picture below what is visible
 _SQUARE = 256.0  # points of a side, in which a curve is thinned; a power of two
@@ -133,58 +124,42 @@ def _reached(
 
 def axis_of(variable: Variable | SystemOutput) -> Axis:
     """Return a variable or an output as it is drawn, on its own range."""
-    is_undrawn = {
-        term.name: isinstance(term.function, (Linear, Formula))
-        for term in variable.terms
-    }
-    curves = tuple(term_curve(t) for t in variable.terms if not is_undrawn[t.name])
-    others = tuple(name for name, is_left in is_undrawn.items() if is_left)
+    others = tuple(
+        t.name for t in variable.terms if isinstance(t.function, (Linear, Formula))
+    )
+    curves = tuple(term_curve(t) for t in variable.terms if t.name not in others)
     ends = variable.low, variable.high
     if variable.categories:
         ends = 0.0, len(variable.categories) - 1.0
     return Axis(variable.name, variable.unit, curves, others, *ends, variable.parts)
 
 
-def curve_of(name: str, shape: Shape) -> Curve:
-    """Return a shape's curve: its degrees are computed in fractions.
+def term_curve(term: Term, values: Mapping[str, float] = MappingProxyType({})) -> Curve:
+    """Return the curve of a term that is no sum of inputs, a formula's at some values.
 
     Example:
-        >>> curve_of("low", Band(0.0, 1.0)).corners
-        (0.0, 1.0)
+        >>> from fuzzytree.model import Band
+        >>> term_curve(Term("low", Band(high=1.0, right=3.0))).degree(2.5)
+        0.25
     """
 
-    @lru_cache(maxsize=_KEPT)  # pictures of findings use the same values again
     def degree(value: float) -> float:
-        return float(exact_degree(shape, Fraction(value)))
+        return term.height * curve_degree(term.function, value, values)
 
-    return Curve(name, degree, _corners(shape))
-
-
-def _corners(curve: SystemCurve) -> tuple[float, ...]:
-    """Return where a curve may turn or step, in order."""
-    return tuple(sorted({one for one in curve.knots() if math.isfinite(one)}))
-
-
-def term_curve(label: Term) -> Curve:
-    """Return the curve of a term that is neither a sum of inputs nor a formula."""
-    curve = label.function
-    if isinstance(curve, (Band, LR, Points)) and label.height == 1.0:
-        return curve_of(label.name, curve)
-
-    def degree(value: float) -> float:
-        return min(max(label.height * curve_degree(curve, value), 0.0), 1.0)
-
-    return Curve(label.name, degree, _corners(curve))
+    knots = {knot for knot in term.function.knots() if math.isfinite(knot)}
+    return Curve(term.name, degree, tuple(sorted(knots)))
 
 
 def curve_points(curve: Curve, low: float, high: float) -> list[tuple[float, float]]:
     """Return values and degrees that a curve between two values is drawn through.
 
-    Degrees are exact, and there is a point at each corner and on both sides of each
-    step. Points that lie on a line between others, as far as one sees, are left out.
+    There is a point at each corner and on both sides of each step. Points that lie on a
+    line between others, as far as one sees, are left out.
 
     Example:
-        >>> curve_points(curve_of("low", Band(high=1.0, right=3.0)), 0.0, 4.0)
+        >>> from fuzzytree.model import Band
+        >>> low = term_curve(Term("low", Band(high=1.0, right=3.0)))
+        >>> curve_points(low, 0.0, 4.0)
         [(0.0, 1.0), (1.0, 1.0), (3.0, 0.0), (4.0, 0.0)]
     """
     values = {between(low, high, k / _STEPS) for k in range(_STEPS + 1)}
@@ -423,7 +398,7 @@ def axis_marks(x: Scale, base: float) -> Iterator[Markup]:
     previous = -math.inf
     for value, word in zip(values, tick_words(values), strict=True):
         at = x.at(value)
-        half = 0.5 * LETTER * 10 * len(word)
+        half = text_width(word, LOOKS["small"][0]) / 2.0
         yield mark("line", at, at, base, base + 4, "tick")
         left = min(max(at, x.start - 6 + half), x.end + 6 - half)
         if left - half > previous + 4:

@@ -29,6 +29,7 @@ from fuzzytree.report.drawing import (
     listing,
     path_of,
     polyline,
+    term_curve,
     text_block,
 )
 from fuzzytree.report.markup import mark
@@ -40,7 +41,6 @@ from fuzzytree.semantics import (
     Status,
     answer_of,
     consequents,
-    curve_degree,
     hedged,
     input_values,
     rules_of,
@@ -200,16 +200,14 @@ class _Scene:
 
     def _curve(self, proposition: Proposition, variable: Variable) -> Curve:
         terms = [term for term in variable.terms if term.name in proposition.terms]
+        curves = [term_curve(term, self.values) for term in terms]
 
         @functools.cache
         def degree(value: float) -> float:
-            degrees = (
-                term.height * curve_degree(term.function, value, self.values)
-                for term in terms
-            )
+            degrees = (curve.degree(value) for curve in curves)
             return hedged(proposition.hedges, max(degrees, default=1.0))
 
-        corners = {knot for term in terms for knot in term.function.knots()}
+        corners = {corner for curve in curves for corner in curve.corners}
         return Curve(variable.name, degree, tuple(sorted(corners)))
 
     def conclusion(

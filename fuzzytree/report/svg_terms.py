@@ -68,46 +68,34 @@ def terms_picture(
     span: Span | None = None,
     value: float | None = None,
     named: Collection[str] | None = None,
-) -> Markup:
-    """Return the terms of a variable, over the histogram of its rows.
+) -> tuple[Markup, float]:
+    """Return the terms of a variable over the histogram of its rows, and the height.
 
     Args:
         axis: The variable.
-        data: The rows.
+        data: The rows; without them terms have colours.
         name: Of the picture, unlike all others of the page.
         span: A part of its values, which is hatched.
         value: A point, which is marked.
         named: The terms that a finding is about; the others are faint.
     """
-    marks, high = _terms_marks(axis, data, span, value, named)
-    return _svg(axis, marks, high, name)
-
-
-def _terms_marks(
-    axis: Axis,
-    data: Data | None,
-    span: Span | None = None,
-    value: float | None = None,
-    named: Collection[str] | None = None,
-    *,
-    has_colours: bool = False,
-) -> Block:
-    """Return the marks of a picture of terms."""
     x = scale_of(axis, data)
     curves = axis.curves[:MOST_CURVES]
     names, notes = _names_of(curves, x)
     top = 8.0 + _ROW * max((name.row + 1 for name in names), default=0)
     y = Scale(0.0, 1.0, top + _PLOT, top)
     marks = [*_bins(axis, data, x, y)]
-    marks += outside(axis, x, top - 4, y.start)
+    marks += _outside(axis, x, top - 4, y.start)
     if span is not None:
         start, end = _ends(span, x)
         marks.append(
             mark("rect", start, top - 4, end - start, y.start - top + 4, "region")
         )
     marks.append(mark("line", _LEFT, _RIGHT, y.start, y.start, "axis"))
-    marks += _curves(curves, x, y, named, has_colours=has_colours)
-    marks += _name_marks(names, top, has_colours=has_colours)
+    has_colours = data is None and not named
+    colours = [class_mark(k) if has_colours else "" for k in range(len(curves))]
+    marks += _curves(curves, x, y, named, colours)
+    marks += _name_marks(names, top, colours)
     if value is not None:
         at = x.at(value)
         marks.append(mark("line", at, at, top - 4, y.start, "pin"))
@@ -117,16 +105,13 @@ def _terms_marks(
     rest = len(axis.curves) - len(curves)
     notes += [f"{rest} not drawn"] if rest else []
     words, high = text_block(_LEFT, y.start + 22.0, notes, WIDE - 2 * _LEFT)
-    return [*marks, *words], y.start + 22.0 + high
-
-
-def _svg(axis: Axis, marks: list[Markup], high: float, name: str) -> Markup:
-    terms = ", ".join(curve.name for curve in axis.curves[:MOST_CURVES]) or "none"
+    terms = ", ".join(curve.name for curve in curves) or "none"
     domain = ""
     if axis.low is not None and axis.high is not None:
         domain = f"; the domain is {number(axis.low)} to {number(axis.high)}"
     about = f"Degrees from 0 to 1 over the values{domain}; terms: {terms}"
-    return mark("svg", WIDE, high, name, f"The terms of {axis.title}", about, marks)
+    title, high = f"The terms of {axis.title}", y.start + 22.0 + high
+    return mark("svg", WIDE, high, name, title, about, [*marks, *words]), high
 
 
 def draw_terms(model: Document, *, title: str | None = None) -> Picture:
@@ -161,8 +146,7 @@ def _card(variable: Variable | SystemOutput, name: str) -> Block:
         words, high = text_block(0.0, top, note, WIDE)
         marks, top = marks + words, top + high
     if axis.curves:
-        inner, high = _terms_marks(axis, None, has_colours=True)
-        terms = _svg(axis, inner, high, name)
+        terms, high = terms_picture(axis, None, name)
         marks.append(mark("group", [terms], move=f"translate(0 {top + 4.0:.1f})"))
         top += high
     return marks, top + _GAP
@@ -181,19 +165,16 @@ def _curves(
     x: Scale,
     y: Scale,
     named: Collection[str] | None,
-    *,
-    has_colours: bool,
+    colours: Sequence[str],
 ) -> Iterator[Markup]:
     """Yield the curves of terms; all but those that are named, if any, are faint."""
     for place, curve in enumerate(curves):
-        is_faint = bool(named) and curve.name not in (named or ())
-        look = "curve faint" if is_faint else "curve"
-        look += f" {class_mark(place)}" if has_colours else ""
-        dashes = DASHES[place % len(DASHES)]
+        look = "curve faint" if named and curve.name not in named else "curve"
+        look, dashes = f"{look} {colours[place]}".rstrip(), DASHES[place % len(DASHES)]
         yield mark("curve", curve.name, polyline(curve, x, y), look, dashes)
 
 
-def outside(axis: Axis, x: Scale, top: float, base: float) -> Iterator[Markup]:
+def _outside(axis: Axis, x: Scale, top: float, base: float) -> Iterator[Markup]:
     """Yield what shows where a variable is outside of the domain."""
     if axis.low is None or axis.high is None:
         return
@@ -265,15 +246,15 @@ def _rows_of(texts: Sequence[tuple[str, float, int]], x: Scale) -> list[_Name]:
 
 
 def _name_marks(
-    names: Sequence[_Name], top: float, *, has_colours: bool
+    names: Sequence[_Name], top: float, colours: Sequence[str]
 ) -> Iterator[Markup]:
     bases = [top - 9.0 - _ROW * name.row for name in names]
     for name, base in zip(names, bases, strict=True):
         if name.row:
             yield mark("line", name.middle, name.middle, base + 3, top - 4, "lead")
     for name, base in zip(names, bases, strict=True):
-        own = f" {class_mark(name.place)}" if has_colours else ""
-        yield mark("words", name.middle, base, name.text, f"name{own}", "middle")
+        look = f"name {colours[name.place]}".rstrip()
+        yield mark("words", name.middle, base, name.text, look, "middle")
 
 
 def _top(curve: Curve, x: Scale) -> float:

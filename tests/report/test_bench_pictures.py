@@ -16,7 +16,6 @@ from msgspec.structs import replace
 
 from fuzzytree.benchmarking.records import Kind, Point, Question, Study
 from fuzzytree.errors import MissingExtraError, WriteError, install_hint
-from fuzzytree.report.drawing import LETTER
 from fuzzytree.report.svg_bench import (
     Panel,
     marks_of,
@@ -172,7 +171,7 @@ def test_peers_are_named_where_points_are_few() -> None:
 def test_names_lie_apart_and_within_the_picture(count: int) -> None:
     boxes: list[tuple[float, float, float, float]] = []
     for text, _, x, y, anchor in words(large(count), "name"):
-        wide = 11.5 * LETTER * len(text)
+        wide = 0.6 * 11.0 * len(text)
         left = x - wide * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
         assert 92.0 <= left <= left + wide <= 788.0, text
         boxes.append((left, y - 9.0, left + wide, y + 2.0))
