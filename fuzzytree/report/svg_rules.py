@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.model import (
@@ -19,6 +20,7 @@ from fuzzytree.model import (
     Variable,
 )
 from fuzzytree.report.drawing import (
+    Axis,
     Block,
     Curve,
     Scale,
@@ -174,16 +176,16 @@ class _Scene:
         rules: Rules = model.rules
         names = {p.variable for rule in rules for p in _propositions(rule.when)}
         self.columns = [one for one in model.variables if one.name in names]
-        self.scales = {one.name: self._scale(one) for one in self.columns}
         self.conclusions = consequents(model, row)
+        ends = {one.name: [self.values[one.name]] for one in self.columns}
+        for name, (activated, _) in self.conclusions.items():
+            ends[name] = [value for one in activated for value, _ in one.points]
+        axes = [*map(axis_of, self.columns), *map(axis_of, model.outputs)]
+        self.scales = {axis.name: _scale(axis, ends[axis.name]) for axis in axes}
 
     def word(self, name: str) -> str:
         """Return the value of a variable with its unit, or its category."""
         return value_word(self.variables[name], self.values[name])
-
-    def _scale(self, variable: Variable) -> Scale:
-        whole, value = scale_of(axis_of(variable), None), self.values[variable.name]
-        return Scale(min(whole.low, value), max(whole.high, value), 0.0, _CELL)
 
     def cell(self, rule: Rule | SystemRule, column: Variable) -> Block:
         """Return the propositions of a rule about a variable, below one another."""
@@ -194,7 +196,9 @@ class _Scene:
                 curve = self._curve(proposition, column)
                 level = curve.degree(value)
                 points = curve_points(_clipped(curve, level), x.low, x.high)
-                words = " ".join((*proposition.hedges, " or ".join(proposition.terms)))
+                words = " or ".join(proposition.terms)
+                if proposition.hedges:
+                    words = f"{' '.join(proposition.hedges)} ({words})"
                 plots.append(_plot(words, level, x, [curve], points, value))
         return _below(plots)
 
@@ -214,7 +218,7 @@ class _Scene:
         self, rule: Rule | SystemRule, position: int, output: SystemOutput
     ) -> Block:
         """Return what a rule concludes of an output, as far as it is activated."""
-        x, is_weighted = self._output_scale(output), output.defuzzifier.is_weighted
+        x, is_weighted = self.scales[output.name], output.defuzzifier.is_weighted
         activated = {
             c.term: c for c in self.conclusions[output.name][0] if c.rule == position
         }
@@ -231,21 +235,21 @@ class _Scene:
             plots.append(_plot(name, level, x, curves, points, is_area=not is_weighted))
         return _below(plots)
 
-    def _output_scale(self, output: SystemOutput) -> Scale:
-        whole = scale_of(axis_of(output), None)
-        values = [v for c in self.conclusions[output.name][0] for v, _ in c.points]
-        ends = min([whole.low, *values]), max([whole.high, *values])
-        return Scale(*ends, 0.0, _CELL)
-
     def result(self, output: SystemOutput, value: float) -> Block:
         """Return all conclusions of an output together, and its number."""
         activated, joined = self.conclusions[output.name]
-        x = self._output_scale(output)
+        x = self.scales[output.name]
         points = joined or [point for one in activated for point in one.points]
         words = f"{output.name} = {number(value)} {output.unit}".rstrip()
         pin = value if x.low <= value <= x.high else None
         marks, high = _plot(words, None, x, [], points, pin, is_area=bool(joined))
         return [*marks, *axis_marks(x, high - 4.0)], high + 16.0
+
+
+def _scale(axis: Axis, values: Sequence[float]) -> Scale:
+    """Return the scale of a cell, with the range of a variable and some values."""
+    whole, finite = scale_of(axis, None), [*filter(math.isfinite, values)]
+    return Scale(min([whole.low, *finite]), max([whole.high, *finite]), 0.0, _CELL)
 
 
 def _below(blocks: Sequence[Block]) -> Block:
@@ -278,7 +282,7 @@ def _plot(
     if level is not None:
         marks.append(mark("words", x.end, 8.0, _short(level), "small", "end"))
     y = Scale(0.0, 1.0, top + 4.0 + _PLOT, top + 4.0)
-    dots = [(x.at(v), y.at(degree)) for v, degree in points]
+    dots = [(x.at(v), y.at(degree)) for v, degree in points if math.isfinite(v)]
     if is_area and dots:
         area = [(dots[0][0], y.start), *dots, (dots[-1][0], y.start)]
         marks.append(mark("path", path_of(area), "filled"))

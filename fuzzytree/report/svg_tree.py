@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import msgspec
 
@@ -127,6 +127,7 @@ def _tree_marks(boxes: Sequence[Box]) -> tuple[list[Markup], float, float]:
 def boxes_of(tree: Document, rows: Passing | None) -> list[Box]:
     """Return all nodes and leaves, depth first; `arrange` puts them in their places."""
     codes = {label: code for code, label in enumerate(tree.classes)}
+    categorical = {one.name for one in tree.variables if one.categories}
     boxes: list[Box] = []
     todo: list[tuple[int | None, int | None, str, Box | None]]
     todo = [(1, None, "", None) if tree.nodes else (None, 1, "", None)]
@@ -138,7 +139,7 @@ def boxes_of(tree: Document, rows: Passing | None) -> list[Box]:
             box = Box(level, f"{tested.variable}?", "", branch)
             box.counts = rows.nodes[node - 1] if rows else ()
             todo += [
-                (way.node, way.leaf, _branch_words(tested, place), box)
+                (way.node, way.leaf, _branch_words(tested, place, categorical), box)
                 for place, way in reversed([*enumerate(tested.branches)])
             ]
         else:
@@ -179,8 +180,11 @@ def _classes_text(counts: Counts, classes: Sequence[str]) -> str:
     return f": {', '.join([*shown[:_MOST_CLASSES], *more])}"
 
 
-def _branch_words(node: Node, place: int) -> str:
-    return f"{' or '.join(node.branches[place].terms)}: {taken(node, place, '≤')}"
+def _branch_words(node: Node, place: int, categorical: Collection[str]) -> str:
+    """Return the terms of a branch, with its values where they are numbers."""
+    terms = " or ".join(node.branches[place].terms)
+    is_number = node.variable not in categorical
+    return f"{terms}: {taken(node, place, '≤')}" if is_number else terms
 
 
 def arrange(boxes: Sequence[Box]) -> None:

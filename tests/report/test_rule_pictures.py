@@ -82,6 +82,14 @@ def test_strengths_and_outputs_are_those_of_run(seed: int) -> None:
         assert f"{output.name} is {value}" in " ".join(words(svg))
 
 
+@pytest.mark.parametrize("value", [0.0, -1e300, 1e300, 1e-300])
+def test_points_are_finite_wherever_the_row_is(value: float) -> None:
+    for seed in range(12):
+        system = random_system(seed)
+        svg = ft.draw(system, row=dict.fromkeys(system.inputs, value)).svg
+        assert not re.search(r'="[^"]*\b(nan|inf)\b', svg)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_a_tree_is_shown_by_its_relative_rules_and_says_what_run_says(
     seed: int,

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import msgspec
 import numpy as np
+import pandas as pd
 import pytest
 from msgspec.structs import replace
 
@@ -122,6 +123,14 @@ def test_names_with_signs_of_markup_or_many_letters_do_no_harm() -> None:
     )
     assert "<x>?" in written(tree)
     assert float(ElementTree.fromstring(draw_tree(tree).svg).get("width", "")) < 1200
+
+
+def test_branches_of_categories_have_their_names_alone() -> None:
+    table = pd.DataFrame({"city": ["Bern", "Rom", "Oslo"] * 20})
+    tree = ft.learn(table, target=["a", "b", "c"] * 20)
+    branches = {box.branch for box in boxes_of(tree, None)} - {""}
+    assert branches
+    assert not any(":" in branch for branch in branches)
 
 
 def test_names_of_forty_leaves_are_whole_and_apart() -> None:
