@@ -12,7 +12,14 @@ from msgspec.structs import replace
 from fuzzytree.errors import ReadError
 from fuzzytree.model import FloatArray, FuzzySystem, Loss, Reading, SystemOutput
 from fuzzytree.runtimes import run_system
-from fuzzytree.semantics import Aim, infer, landmarks_of, range_rows, system_probes
+from fuzzytree.semantics import (
+    Aim,
+    infer,
+    landmarks_of,
+    range_rows,
+    row_values,
+    system_probes,
+)
 
 _ROWS = 200  # of each kind: on landmarks, drawn evenly, and aimed at rules
 _FEW = 4  # which are tried before all where rules are many
@@ -160,7 +167,7 @@ def _values(system: FuzzySystem) -> FloatArray:
     aim = Aim(system)
     rows = [*range_rows(system, _ROWS), *system_probes(system, limit=_ROWS)]
     rows += [aim.row(rule) for rule in system.rules[:_ROWS]]
-    table = [[float(f"{row[name]:.4g}") for row in rows] for name in system.inputs]
-    values = np.array(table, np.float64).reshape(len(system.inputs), len(rows))
+    short = [{name: float(f"{x:.4g}") for name, x in row.items()} for row in rows]
+    values = row_values(system, short)
     result: FloatArray = values[:, np.isfinite(values).all(axis=0)]
     return result

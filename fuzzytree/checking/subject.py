@@ -56,16 +56,15 @@ from fuzzytree.runtimes import baseline, definition, run_system
 from fuzzytree.semantics import (
     Aim,
     Program,
-    Row,
     Status,
     float32_rounding,
     forms,
     probe_values,
     program_of,
     range_rows,
+    row_values,
     rules_from_tree,
     spreads,
-    system_probes,
 )
 
 GRID_LIMIT = 1 << 21
@@ -334,7 +333,7 @@ def coverage_of(system: FuzzySystem) -> Coverage:
 def _aimed_probes(system: FuzzySystem, limit: int) -> tuple[FloatArray, Coverage]:
     """Return probes, with more of them aimed at the rules that do not fire in these."""
     run = run_system(system)
-    tables = [_values(system, system_probes(system, limit=limit))]
+    tables = [probe_values(system, limit)]
     fired = np.asarray(_fired(run, tables[0]).any(axis=1))
     aim = Aim(system)
     missed = np.flatnonzero(~fired).tolist()
@@ -342,11 +341,11 @@ def _aimed_probes(system: FuzzySystem, limit: int) -> tuple[FloatArray, Coverage
         numbers = [one for one in missed[start : start + _AT_ONCE] if not fired[one]]
         if not numbers:
             continue
-        table = _values(system, [aim.row(system.rules[one]) for one in numbers])
+        table = row_values(system, [aim.row(system.rules[one]) for one in numbers])
         fires = _fired(run, table)
         tables.append(table[:, fires[~fired].any(axis=0)])
         fired |= fires.any(axis=1)
-    drawn = run(_values(system, range_rows(system, _DRAWN)))
+    drawn = run(row_values(system, range_rows(system, _DRAWN)))
     coverage = Coverage(
         len(system.rules),
         tuple(one + 1 for one in np.flatnonzero(~fired).tolist()),
@@ -362,10 +361,3 @@ def _fired(run: Run, values: FloatArray) -> BoolArray:
     assert degrees is not None  # systems give them
     fires: BoolArray = degrees > 0.0
     return fires
-
-
-def _values(system: FuzzySystem, rows: Sequence[Row]) -> FloatArray:
-    """Return rows as an array of shape (columns, rows)."""
-    names = system.inputs
-    table = np.array([[row[name] for row in rows] for name in names], np.float64)
-    return table.reshape(len(names), len(rows))

@@ -63,6 +63,7 @@ from .probing import neighbours as neighbours
 from .probing import probe_values as probe_values
 from .probing import probes as probes
 from .probing import range_rows as range_rows
+from .probing import row_values as row_values
 from .probing import system_probes as system_probes
 from .programs.bounds import ORIGIN as ORIGIN
 from .programs.bounds import error_bounds as error_bounds

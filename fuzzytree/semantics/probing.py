@@ -137,9 +137,13 @@ def _spread(rows: Sequence[Row], count: int) -> list[Row]:
 
 def probe_values(model: Document, limit: int, *, seed: int = 0) -> FloatArray:
     """Return the rows of `probes` as (inputs, rows)."""
+    return row_values(model, probes(model, limit=limit, seed=seed))
+
+
+def row_values(model: Document, rows: Sequence[Row]) -> FloatArray:
+    """Return rows as an array of shape (inputs, rows)."""
     import numpy as np
 
-    rows = probes(model, limit=limit, seed=seed)
     table = np.array([[row[n] for row in rows] for n in model.inputs], np.float64)
     return table.reshape(len(model.inputs), len(rows))
 

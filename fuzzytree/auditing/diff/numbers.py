@@ -54,7 +54,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.numerics import outwards
 from fuzzytree.runtimes import baseline
-from fuzzytree.semantics import joined_outputs, system_probes
+from fuzzytree.semantics import joined_outputs, probe_values
 
 _PROBES = 2_000  # of each system
 _DRAWN = 4_000  # at most, for numbers take longer than decisions
@@ -182,7 +182,9 @@ def _sample_answers(
     samples: list[tuple[str, FloatArray, str]] = []
     if rows is not None:
         samples.append(("rows", rows.values, f"rows of {rows.name}"))
-    probes = pair.within(_probes(system) for system in (pair.old, pair.new))
+    probes = pair.within(
+        probe_values(system, _PROBES) for system in (pair.old, pair.new)
+    )
     samples.append(("probes", probes, "probes of both systems within the domain"))
     points = pair.draw(min(settings.rows, _DRAWN), seed)
     samples.append(
@@ -204,12 +206,6 @@ def _sample_answers(
         )
     if differences.left:
         yield left_out("points", f"{differences.left} points", _SPENT)
-
-
-def _probes(system: FuzzySystem) -> FloatArray:
-    rows = system_probes(system, limit=_PROBES)
-    table = [[row[name] for row in rows] for name in system.inputs]
-    return np.array(table, np.float64).reshape(len(system.inputs), len(rows))
 
 
 class _Numbers(Differences):
