@@ -106,8 +106,15 @@ def _with_commands(block: re.Match[str]) -> str:
 
 
 def verbs() -> Iterator[str]:
-    """Yield every verb with its usage and its options."""
-    yield from _commands(program, click.Context(program, info_name="fuzzytree"), 2)
+    """Yield a table of all verbs, and every verb with its usage and its options."""
+    context = click.Context(program, info_name="fuzzytree")
+    rows = []
+    for name in program.list_commands(context):
+        command = program.get_command(context, name)
+        text = command.get_short_help_str(200) if command else ""
+        rows.append((f"[`{name}`](#fuzzytree-{name})", text))
+    yield _table(("verb", "what"), rows)
+    yield from _commands(program, context, 2)
 
 
 def _commands(group: click.Group, parent: click.Context, level: int) -> Iterator[str]:
