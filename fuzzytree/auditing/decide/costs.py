@@ -175,6 +175,8 @@ class Costs:
         values = [*map(Fraction, side.points)]
         if not values:
             values = [min(max(x, Fraction(side.low)), Fraction(side.high))]
+            if side.is_whole:  # from which a stand-in may be a half
+                values = [replace(side, missing=None).nearest(x)]
             if side.missing is not None:
                 values.append(Fraction(side.missing))
         return min((self.of(name, x, value), value) for value in values)

@@ -158,10 +158,10 @@ class Polytopes:
             if best is not None and best.high is not None and bound > best.high:
                 break
             used = {place for row in part.sums for place in row.weights}
-            mixed = [p for p in sorted(used) if _is_mixed(part, p, costs)]
-            if mixed:  # numbers, and a stand-in beside them
+            mixed = [p for p in sorted(used) if _is_mixed(part.sides[p], at[p], costs)]
+            if mixed:  # values some of which cost nothing, or that have no order
                 place = mixed[0]
-                for half in _split(part, part.sides[place], ZERO):
+                for half in _split(part, part.sides[place], at[place]):
                     cost, _ = costs.nearest(half.sides[place], at[place])
                     least = max(bound, outwards(cost)[0])
                     heapq.heappush(queue, (least, next(number), half))
@@ -281,19 +281,29 @@ def _beside(
     return value if side.has(value) else simple(low, high)
 
 
-def _is_mixed(part: Polytope, place: int, costs: Costs) -> bool:
-    """Return whether a part has numbers of an input, and its stand-in besides."""
-    side = part.sides[place]
-    return not side.values and side.missing == costs.stand_in(side.variable) is not None
+def _is_mixed(side: DomainSide, x: Fraction, costs: Costs) -> bool:
+    """Return whether a side has a category and others, or numbers and a stand-in."""
+    if side.values:
+        return x in side.points and len(side.points) > 1
+    return side.missing == costs.stand_in(side.variable) is not None
 
 
 def _split(part: Polytope, side: DomainSide, x: Fraction) -> list[Polytope]:
-    """Return two halves of a part: beside a value, or without a stand-in and at it."""
+    """Return two halves of a part: beside a value, or without a value and at it.
+
+    The value is a category, or else the stand-in of numbers.
+    """
     halves: list[DomainSide | None]
     missing = side.missing
     if missing is not None and not side.values:
         only = replace(side, low=missing, high=missing, values=(missing,))
         halves = [replace(side, missing=None), only]
+    elif x in side.points:
+        rest = tuple(value for value in side.points if value != x)
+        halves = [
+            replace(side, low=some[0], high=some[-1], values=some, missing=None)
+            for some in (rest, (float(x),))
+        ]
     else:
         below = float(x.numerator // x.denominator)
         if side.values:

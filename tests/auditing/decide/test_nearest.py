@@ -164,6 +164,17 @@ def test_no_cheaper_change_of_a_tree_exists(seed: int) -> None:
         check(leaves, result, row, chance)
 
 
+@pytest.mark.parametrize("seed", [2, 4, 6, 11])
+def test_bounds_meet_for_sums_of_categories_and_whole_numbers(seed: int) -> None:
+    tree, domain = valued(random_tree(seed, inputs=3, combinations=0.8), seed)
+    leaves, chance = Leaves(tree, domain), random.Random(seed)
+    for _ in range(4):
+        row = draw_row(domain, tree.inputs, chance)
+        result = nearest(leaves, row)
+        assert result.is_narrow
+        check(leaves, result, row, chance)
+
+
 @pytest.mark.parametrize("seed", some_seeds(6))
 def test_fixed_columns_stay_and_costs_are_the_unit(seed: int) -> None:
     rules, domain = random_base(seed, "categories")
