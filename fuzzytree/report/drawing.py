@@ -35,6 +35,7 @@ LOOKS = {
 Block = tuple[list[Markup], float]
 """Marks from (0, 0) on, and how high they are."""
 
+_MOST_WIDE = 900.0  # lines of words
 _STEPS = 72  # at which a curve is evaluated, beside its corners
 _CORNERS = 160  # of one curve that are drawn exactly
 _KEPT = 1024  # letters
@@ -370,8 +371,9 @@ class Sheet:
         self.words(heading, "strong")
 
     def words(self, words: str | Sequence[str], look: str = "small") -> None:
-        """Add words in lines."""
-        self.row([text_block(0.0, 0.0, words, self.inside, look)])
+        """Add words in lines, which are not too long to be read."""
+        wide = min(self.inside, _MOST_WIDE)
+        self.row([text_block(0.0, 0.0, words, wide, look)])
 
     def row(
         self, blocks: Sequence[Block], step: float = 0.0, about: str | None = None

@@ -52,6 +52,7 @@ MOST_RULES = 100
 """Of a picture."""
 
 _NUMBER, _CELL, _GAP, _END = 34.0, 132.0, 16.0, 104.0  # wide: from left to right
+_COLUMNS = 7  # at most, of variables; more are named in cells
 _PLOT, _ROW = 30.0, 10.0  # high: curves, and between rows
 _ABOUT = "A row for each rule, a cell for each proposition: curve, value and degree. "
 _STYLE = ".filled { fill: var(--k, var(--c0)); fill-opacity: .35; }\n"
@@ -81,7 +82,7 @@ def draw_rules(
         )
     scene = _Scene(base, row)
     numbers = [*zip(base.outputs, answer.outputs, strict=True)]
-    columns = len(scene.columns) + len(numbers)
+    columns = scene.width + len(numbers)
     sheet = Sheet(
         _NUMBER + columns * (_CELL + _GAP) + _END,
         title or f"The rules of {model.name} for a row",
@@ -94,22 +95,23 @@ def draw_rules(
         )
     sheet.words(verdict, "words")
     sheet.words(listing([f"{name} = {scene.word(name)}" for name in base.inputs]))
-    heads = [f"{column.name} = {scene.word(column.name)}" for column in scene.columns]
-    heads += [output.name for output in base.outputs]
     for column in scene.columns:
         sheet.words(sum_words(column))
+    heads = [f"{column.name} = {scene.word(column.name)}" for column in scene.columns]
+    heads = [*(heads if scene.is_table else [""] * scene.width)]
+    heads += [output.name for output in base.outputs]
     blocks = [text_block(0.0, 0.0, head, _CELL, "term") for head in heads]
     sheet.top += _ROW
     _add_row(sheet, blocks, look="")
     for k, rule in enumerate(rules, 1):
         strength = answer.strengths[k - 1]
-        blocks = [scene.cell(rule, column) for column in scene.columns]
+        blocks = scene.cells(rule)
         blocks += [scene.conclusion(rule, k, output) for output in base.outputs]
         blocks.append(_strength(base, rule, strength))
         about = f"rule {k}, strength {number(strength)}: {rule_text(rule)}"
         _add_row(sheet, blocks, str(k), about, is_winner=k == answer.rule)
     if numbers:
-        blocks = [([], 0.0) for _ in scene.columns]
+        blocks = [([], 0.0)] * scene.width
         blocks += [scene.result(output, value) for output, value in numbers]
         _add_row(sheet, blocks, about=verdict, look="axis")
     return sheet.picture(_ABOUT + verdict, _STYLE)
@@ -176,6 +178,9 @@ class _Scene:
         rules: Rules = model.rules
         names = {p.variable for rule in rules for p in _propositions(rule.when)}
         self.columns = [one for one in model.variables if one.name in names]
+        counts = [len({p.variable for p in _propositions(r.when)}) for r in rules]
+        self.is_table = len(self.columns) <= max(_COLUMNS, *counts)
+        self.width = len(self.columns) if self.is_table else max(counts)
         self.conclusions = consequents(model, row)
         ends = {one.name: [self.values[one.name]] for one in self.columns}
         for name, (activated, _) in self.conclusions.items():
@@ -187,22 +192,29 @@ class _Scene:
         """Return the value of a variable with its unit, or its category."""
         return value_word(self.variables[name], self.values[name])
 
-    def cell(self, rule: Rule | SystemRule, column: Variable) -> Block:
-        """Return the propositions of a rule about a variable, below one another."""
-        x, value = self.scales[column.name], self.values[column.name]
-        plots: list[Block] = []
+    def cells(self, rule: Rule | SystemRule) -> list[Block]:
+        """Return the propositions of a rule, those about a variable below one another.
+
+        Each variable has its column, or where these are many only its name.
+        """
+        plots: dict[str, list[Block]] = {one.name: [] for one in self.columns}
         for proposition in _propositions(rule.when):
-            if proposition.variable == column.name:
-                curve = self._curve(proposition, column)
-                level = curve.degree(value)
+            name = proposition.variable
+            if name in plots:
+                x, curve = self.scales[name], self._curve(proposition)
+                level = curve.degree(self.values[name])
                 points = curve_points(_clipped(curve, level), x.low, x.high)
                 words = " or ".join(proposition.terms)
                 if proposition.hedges:
                     words = f"{' '.join(proposition.hedges)} ({words})"
-                plots.append(_plot(words, level, x, [curve], points, value))
-        return _below(plots)
+                words = words if self.is_table else f"{name} is {words}"
+                plot = _plot(words, level, x, [curve], points, self.values[name])
+                plots[name].append(plot)
+        blocks = [_below(own) for own in plots.values() if own or self.is_table]
+        return [*blocks, *[([], 0.0)] * (self.width - len(blocks))]
 
-    def _curve(self, proposition: Proposition, variable: Variable) -> Curve:
+    def _curve(self, proposition: Proposition) -> Curve:
+        variable = self.variables[proposition.variable]
         terms = [term for term in variable.terms if term.name in proposition.terms]
         curves = [term_curve(term, self.values) for term in terms]
 

@@ -8,7 +8,15 @@ import msgspec
 
 from fuzzytree.model import Document, Node
 from fuzzytree.report.audit_rows import Counts, Passing
-from fuzzytree.report.drawing import EDGE, LOOKS, Sheet, legend, text_block, text_width
+from fuzzytree.report.drawing import (
+    EDGE,
+    LOOKS,
+    Sheet,
+    legend,
+    listing,
+    text_block,
+    text_width,
+)
 from fuzzytree.report.markup import Markup, mark
 from fuzzytree.report.models import taken
 from fuzzytree.report.pictures import Picture, class_mark
@@ -222,7 +230,8 @@ def _fill(box: Box) -> None:
     branch, high = text_block(2.0, 0.0, box.branch, box.wide)
     box.lead = high + 3.0 if branch else 0.0
     title, high = text_block(_INSIDE, box.lead + 4.0, box.title, inside, f"strong{own}")
-    note, more = text_block(_INSIDE, box.lead + high + 3.0, box.note, inside)
+    words = listing(box.note.split(", "), ",")
+    note, more = text_block(_INSIDE, box.lead + high + 3.0, words, inside)
     under = box.lead + high + more + 6.0
     bar = [*_bar(box.counts, _INSIDE, under, inside)]
     box.high = under - box.lead + (12.0 if bar else 3.0)

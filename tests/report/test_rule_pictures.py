@@ -107,6 +107,19 @@ def test_a_tree_is_shown_by_its_relative_rules_and_says_what_run_says(
     assert svg.count('height="0" ') == 0
 
 
+def test_of_many_variables_cells_have_the_names() -> None:
+    terms = (Term("low", Band(high=1.0, right=3.0)),)
+    variables = tuple(Variable(f"v{k}", terms) for k in range(9))
+    rules = tuple(Rule((Proposition(one.name, ("low",)),), "k") for one in variables)
+    many = RuleBase("many", ("k",), variables, rules)
+    svg = ft.draw(many, row=dict.fromkeys(many.inputs, 2.0)).svg
+    assert [text for text in words(svg) if text.endswith(" is low")] == [
+        f"v{k} is low" for k in range(9)
+    ]
+    assert words(svg).count("0.5") == 18
+    assert float(re.findall(r' width="(\d+)', svg)[0]) < 400
+
+
 def test_degrees_stand_beside_terms_and_areas_reach_up_to_them() -> None:
     svg = ft.draw(fan(), row={"heat": 2.5}).svg
     assert words(svg).count("0.75") == 3  # proposition, conclusion, strength
