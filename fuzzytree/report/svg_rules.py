@@ -7,7 +7,10 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
 from fuzzytree.model import (
+    DATE_UNIT,
     And,
     Condition,
     Document,
@@ -52,6 +55,7 @@ MOST_RULES = 100
 """Of a picture."""
 
 _NUMBER, _CELL, _GAP, _END = 34.0, 132.0, 16.0, 104.0  # wide: from left to right
+_MOST_DAYS = 1e6  # from 1970, that a date has
 _COLUMNS = 7  # at most, of variables; more are named in cells
 _PLOT, _ROW = 30.0, 10.0  # high: curves, and between rows
 _ABOUT = "A row for each rule, a cell for each proposition: curve, value and degree. "
@@ -158,12 +162,16 @@ def _short(value: float) -> str:
 
 
 def value_word(variable: Variable, value: float) -> str:
-    """Return a value of an input with its unit, or its category.
+    """Return a value of an input with its unit, its category, or its day.
 
     Example:
         >>> value_word(Variable("mass", unit="kg"), 2.0)
         '2 kg'
+        >>> value_word(Variable("day", unit=DATE_UNIT), 19783.0)
+        '2024-03-01'
     """
+    if variable.unit == DATE_UNIT and value.is_integer() and abs(value) < _MOST_DAYS:
+        return str(np.datetime64(int(value), "D"))
     if variable.categories and value in range(len(variable.categories)):
         return variable.categories[int(value)]
     return f"{number(value)} {variable.unit}".rstrip()
@@ -189,7 +197,7 @@ class _Scene:
         self.scales = {axis.name: _scale(axis, ends[axis.name]) for axis in axes}
 
     def word(self, name: str) -> str:
-        """Return the value of a variable with its unit, or its category."""
+        """Return the value of a variable in words."""
         return value_word(self.variables[name], self.values[name])
 
     def cells(self, rule: Rule | SystemRule) -> list[Block]:
