@@ -231,4 +231,4 @@ def _shade(level: int) -> str:
 
 
 _STYLE = ".cell { fill: var(--k, var(--soft)); shape-rendering: crispEdges; }\n"
-_STYLE += "".join(f".s{k} {{ fill: {_shade(k)}; }}\n" for k in range(_LEVELS))
+_STYLE += "".join(f"rect.s{k} {{ fill: {_shade(k)}; }}\n" for k in range(_LEVELS))

@@ -134,3 +134,11 @@ def test_a_sum_of_inputs_is_no_input() -> None:
     wine = ft.learn("examples/wine/wine.csv", target="cultivar")
     with pytest.raises(ValueError, match="which is no input"):
         ft.draw(wine, surface=["combination 1", "hue"])
+
+
+def test_numbers_keep_their_colours_in_the_dark() -> None:
+    system = random_system(1)
+    svg = ft.draw(system, surface=(system.inputs[0], system.inputs[1])).svg
+    light, dark = svg.split("prefers-color-scheme: dark", 1)
+    assert ".cell {" in dark  # which must not win: a level names its element, too
+    assert re.search(r"rect\.s\d+ {", light)
