@@ -35,6 +35,8 @@ def _bars_mean(tree: Document, passed: Passing | None) -> str:
         if passed.missing:
             said += f"; {counted(passed.missing, 'row')} with a missing value left out"
         return said
+    if all(leaf.counts for leaf in tree.leaves):
+        return "The bar in a box shows the training rows that reach it, by their class"
     if all(leaf.support is not None for leaf in tree.leaves):
         return "A branch is the thicker the more training rows took it"
     return "How many rows reach the leaves is not known"

@@ -17,9 +17,9 @@ from tests.report.drawn_texts import assert_apart, texts_of
 
 def looks(svg: str) -> list[list[str]]:
     """Return the colour of each cell of a picture, from the lowest row."""
-    size = 330.0 / CELLS
+    size = 336.0 / CELLS
     rows: dict[float, list[str]] = {}
-    cell = r' y="([\d.]+)" width="([\d.]+)" height="6.9" class="cell (\w+)"'
+    cell = r' y="([\d.]+)" width="([\d.]+)" height="7" class="cell (\w+)"'
     for top, wide, look in re.findall(cell, svg):
         rows.setdefault(-float(top), []).extend([look] * round(float(wide) / size))
     return [rows[top] for top in sorted(rows)]

@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.model.tree import FuzzyTree, Leaf
+from fuzzytree.report.audit_model import tree_section
 from fuzzytree.report.svg_tree import MOST_LEAVES, boxes_of, draw_tree
 from fuzzytree.testing import random_tree
 from tests.report.drawn_texts import assert_apart, texts_of
@@ -89,6 +90,13 @@ def test_a_box_shows_the_training_rows_that_reach_it_by_class() -> None:
     bare = replace(tree, leaves=leaves)
     assert "rows by class" not in draw_tree(bare).svg
     assert 'class="bar' not in draw_tree(bare).svg
+
+
+def test_a_page_says_that_bars_are_training_rows_where_no_table_is_given() -> None:
+    caption = "The bar in a box shows the training rows that reach it, by their class"
+    assert caption in tree_section(slanted(), None)
+    leaves = tuple(replace(leaf, counts=()) for leaf in slanted().leaves)
+    assert caption not in tree_section(replace(slanted(), leaves=leaves), None)
 
 
 def test_a_tree_without_known_rows_is_drawn_without_them() -> None:
