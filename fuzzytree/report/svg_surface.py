@@ -230,5 +230,7 @@ def _shade(level: int) -> str:
     )
 
 
-_STYLE = ".cell { fill: var(--k, var(--soft)); shape-rendering: crispEdges; }\n"
-_STYLE += "".join(f"rect.s{k} {{ fill: {_shade(k)}; }}\n" for k in range(_LEVELS))
+_STYLE = (
+    ".cell { fill: var(--k, var(--soft)); shape-rendering: crispEdges; }\n"
+    + "".join(f"rect.s{k} {{ fill: {_shade(k)}; }}\n" for k in range(_LEVELS))
+)
