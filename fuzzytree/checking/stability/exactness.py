@@ -118,15 +118,15 @@ def offsets(
     compared with its right predictions, on probes of its edges and on moved data.
 
     There may be no rows of data. Slow runtimes get a share of the rows; those with a
-    bound of their own promise nothing far from zero and are left out.
+    bound of their own promise nothing far from zero and are left out. What gives up at
+    a distance is not tried farther away.
     """
     trial = Trial("N2", _ADVICE_OFFSETS, worst=0.0)
     facts: list[str] = []
     scales = input_scales(model, data)
     rows = data[:, :: max(-(-data.shape[1] // _DATA), 1)]
-    chosen = [runtime for runtime in runtimes if runtime.bound is None]
-    refused: set[str] = set()  # the first distance at which a type gives up is enough
     for representation, form in forms(model).items():
+        chosen = [runtime for runtime in runtimes if runtime.bound is None]
         for ratio in RATIOS:
             steps = {
                 name: one.spread / ratio - (0.5 * one.low + 0.5 * one.high)
@@ -134,38 +134,25 @@ def offsets(
                 else 0.0
                 for name, one in scales.items()
             }
+            where = f"{representation}, spread over distance {ratio:.0e}"
             try:
                 far = moved(form, steps)
             except InvalidModelError as error:
-                why = f"{representation} at {ratio:.0e}: {first_line(error)}"
-                trial.skipped.append(why)
+                trial.skipped.append(f"{where}: {first_line(error)}")
                 continue
             away = rows + np.array([*steps.values()]).reshape(-1, 1)
             values = np.concatenate([probe_values(far, _PROBES), away], axis=1)
             right = truth(far, values)
+            loaded = [loaded_form(where, far, one, trial.skipped) for one in chosen]
             checks: list[tuple[ExactCheck, Dtype]] = []
-            for runtime in chosen:
-                lost: list[str] = []
-                one = loaded_form(representation, far, runtime, lost)
-                for text in (
-                    lost if runtime.name + representation not in refused else ()
-                ):
-                    refused.add(runtime.name + representation)
-                    head, _, why = text.rpartition(": ")
-                    trial.skipped.append(
-                        f"{head}: spread over distance {ratio:.0e}: {why}"
-                    )
-                if one is None:
-                    continue
+            for one in filter(None, loaded):
                 some = one.some(values)
                 known = right if some.shape == values.shape else None
                 check = exact_check(one, some, known)
-                where = f"spread over distance {ratio:.0e}"
-                faults = (f"{where}: {fault}" for fault in check.faults)
-                trial.add(check.rows, *faults, worst=check.worst)
-                checks.append((check, runtime.dtype))
+                trial.add(check.rows, *check.faults, worst=check.worst)
+                checks.append((check, one.runtime.dtype))
+            chosen = [one.runtime for one in loaded if one is not None]
             if ratio in _REPORTED and form.rules:
-                where = f"{representation}, spread over distance {ratio:.0e}"
                 facts += (f"{where}: {cost}" for cost in _costs(checks))
     return trial.result(*facts)
 
