@@ -110,7 +110,9 @@ def exact_errors(
         near = open_paths(cast("FuzzyTree", model), dtype, values)
         return ExactErrors(None, flips, near)
     rules = cast("RuleBase", model)
-    low = None if strengths is None else strength_errors(rules, values, strengths)[0]
+    low = None
+    if strengths is not None:
+        low, _ = strength_errors(rules, values, strengths, truth.fractions)
     return ExactErrors(low, flips, truth.margin <= 2.0 * allowed)
 
 

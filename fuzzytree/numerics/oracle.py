@@ -86,6 +86,7 @@ class Decisions(msgspec.Struct, frozen=True):
         margin: At least so far the strongest class is ahead of the next (see `Exact`).
         margin_high: At most so far.
         by_fractions: How many rows needed fractions.
+        fractions: Exact strengths of rows by their number, kept once they are needed.
     """
 
     rule: IntArray
@@ -96,6 +97,7 @@ class Decisions(msgspec.Struct, frozen=True):
     margin: FloatArray
     margin_high: FloatArray
     by_fractions: int
+    fractions: dict[int, tuple[Fraction, ...]] = {}
 
 
 def decide(
@@ -425,7 +427,10 @@ _MOST_DEGREES = 10_000  # that it computes so: a second or so; one row at least
 
 
 def strength_errors(
-    model: Model, values: FloatArray, strengths: FloatArray
+    model: Model,
+    values: FloatArray,
+    strengths: FloatArray,
+    known: dict[int, tuple[Fraction, ...]] | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return how far given strengths are from the exact ones, in each row.
 
@@ -433,6 +438,8 @@ def strength_errors(
         model: A rule base.
         values: Shape (inputs, rows).
         strengths: Shape (rules, rows); NaN where a value is missing.
+        known: Exact strengths of rows by their number; those that are computed are
+            added, such as `Decisions.fractions` of the same rows.
 
     Returns:
         A lower and an upper end of the largest distance in each row, by intervals. Rows
@@ -463,14 +470,16 @@ def strength_errors(
     low, high = (np.concatenate(ends) for ends in zip(*parts, strict=True))
     terms = sum(len(variable.terms) for variable in model.variables)
     most = min(SHARPENED, max(_MOST_DEGREES // max(terms, 1), 1))
+    known = {} if known is None else known
     for row in np.argsort(-high, kind="stable")[:most].tolist():
         if high[row] <= 1.01 * low.max():
             break
-        named = dict(zip(model.inputs, values[:, row].tolist(), strict=True))
-        exact = exact_answer(model, named).strengths
-        if exact:
+        if row not in known:
+            named = dict(zip(model.inputs, values[:, row].tolist(), strict=True))
+            known[row] = exact_answer(model, named).strengths
+        if known[row]:
             given = map(Fraction, strengths[:, row].tolist())
-            gaps = (abs(a - b) for a, b in zip(given, exact, strict=True))
+            gaps = (abs(a - b) for a, b in zip(given, known[row], strict=True))
             low[row], high[row] = outwards(max(gaps))
     return low, high
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 import msgspec
 import numpy as np
@@ -279,6 +279,7 @@ def _try_terms(
             trial.skipped.append(f"{terms.left_out} of the terms: there are too many")
         right = truth(terms.model, terms.values)
         name = title.format(representation)
+        defined: dict[tuple[bool, int], TermDegrees | None] = {}
         for runtime in runtimes:
             one = loaded_form(name, terms.model, runtime, trial.skipped)
             if one is None:
@@ -292,31 +293,51 @@ def _try_terms(
             if outcome.strengths is None:
                 trial.skipped.append(f"{runtime.name} returns no degrees")
                 continue
-            if not form.outputs:
-                trial.faults += _edge_faults(one, terms, values, outcome.strengths)
+            key = runtime.dtype == "float32", values.shape[1]
+            if not form.outputs and key not in defined:
+                defined[key] = _term_degrees(terms.model, values, is_single=key[0])
+            if (wanted := defined.get(key)) is not None:
+                trial.faults += _edge_faults(one, terms, wanted, outcome.strengths)
             is_all = values.shape == terms.values.shape
             check = exact_check(one, values, right if is_all else None)
             trial.add(outcome.strengths.size, *check.faults, worst=check.worst)
 
 
-def _edge_faults(
-    one: LoadedForm, terms: TermProbes, values: FloatArray, degrees: FloatArray
-) -> Iterator[str]:
-    """Yield which degrees must be 1 or 0 or neither, and are not.
+class TermDegrees(NamedTuple):
+    """The degrees of terms, by the definition, and the values at which they are."""
 
-    The definition decides, for values and stored numbers as float32 rounds them. The
-    tail of an LR set is so flat that only doubles agree about its end.
+    values: FloatArray
+    right: FloatArray
+
+
+def _term_degrees(
+    model: Document, values: FloatArray, *, is_single: bool
+) -> TermDegrees | None:
+    """Return what degrees must be; values and stored numbers may be rounded to float32.
+
+    None if places become one, and so have no edges.
     """
-    model, dtype = one.model, one.runtime.dtype
-    if dtype == "float32":
+    if is_single:
         with np.errstate(over="ignore"):
             values = values.astype(np.float32).astype(np.float64)
         try:
             model = in_units(model, UnitChange(_single, _single, lambda _, part: part))
         except InvalidModelError:
-            return  # places that become one have no edges
+            return None
     right = definition().load(model)(values).strengths
     assert right is not None  # rules have them
+    return TermDegrees(values, right)
+
+
+def _edge_faults(
+    one: LoadedForm, terms: TermProbes, wanted: TermDegrees, degrees: FloatArray
+) -> Iterator[str]:
+    """Yield which degrees must be 1 or 0 or neither, and are not.
+
+    The tail of an LR set is so flat that only doubles agree about its end.
+    """
+    values, right = wanted
+    dtype = one.runtime.dtype
     kinds = np.array([type(curve) for *_, curve in terms.places])[:, np.newaxis]
     is_one, is_zero = right == 1.0, right == 0.0
     if dtype != "float64":
@@ -324,7 +345,7 @@ def _edge_faults(
     wrong = (is_one | is_zero) & (degrees != right)
     wrong |= (degrees == 1.0) & (right < 1.0) & (kinds == Band)
     wrong |= (degrees < 0.0) | (degrees > 1.0) | (np.isnan(degrees) & ~np.isnan(right))
-    lines = {name: line for line, name in enumerate(model.inputs)}
+    lines = {name: line for line, name in enumerate(one.model.inputs)}
     for rule, row in np.argwhere(wrong).tolist():
         (name, term, _), degree = terms.places[rule], float(degrees[rule, row])
         value = float(values[lines[name], row])
