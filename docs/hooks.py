@@ -44,7 +44,7 @@ COMMAND = re.compile(r'^<span class="gp">.*?</span>(.*)$', re.MULTILINE)
 
 
 class Examples(griffe.Extension):
-    """Renders the section `Example:` of a docstring as code, like `Examples:`."""
+    """Renders the section `Example:` of a docstring as code, and names keywords."""
 
     def on_object(self, *, obj: griffe.Object, **_: object) -> None:
         """Rename the section in the docstring of an object."""
@@ -52,6 +52,19 @@ class Examples(griffe.Extension):
             obj.docstring.value = obj.docstring.value.replace(
                 "Example:\n", "Examples:\n"
             )
+
+    def on_function(self, *, func: griffe.Function, **_: object) -> None:
+        """Name the keywords of `**options` where the docstring describes them."""
+        for parameter in func.parameters if func.docstring else ():
+            kind = parameter.annotation
+            if isinstance(kind, griffe.ExprSubscript) and "Unpack" in str(kind.left):
+                assert isinstance(kind.slice, griffe.Expr)
+                keywords = func.modules_collection[kind.slice.canonical_path].attributes
+                names = ", ".join(f"`{name}`" for name in keywords)
+                assert func.docstring
+                func.docstring.value = func.docstring.value.replace(
+                    f" {parameter.name}: ", f" {parameter.name}: {names}. ", 1
+                )
 
 
 def on_page_markdown(markdown: str, page: Page | None = None, **_: object) -> str:
