@@ -111,7 +111,10 @@ def draw_rules(
         strength = answer.strengths[k - 1]
         blocks = scene.cells(rule)
         blocks += [scene.conclusion(rule, k, output) for output in base.outputs]
-        blocks.append(_strength(base, rule, strength))
+        names = (p.variable for p in _propositions(rule.when))
+        before = [name for name in names if name not in scene.variables]
+        note = f"with {', '.join(before)} as concluded before" if before else ""
+        blocks.append(_strength(base, rule, strength, note))
         about = f"rule {k}, strength {number(strength)}: {rule_text(rule)}"
         _add_row(sheet, blocks, str(k), about, is_winner=k == answer.rule)
     if numbers:
@@ -142,8 +145,10 @@ def _add_row(
     sheet.row([(marks, high)], about=about)
 
 
-def _strength(model: Document, rule: Rule | SystemRule, strength: float) -> Block:
-    """Return the strength of a rule as a number and a bar, with its class."""
+def _strength(
+    model: Document, rule: Rule | SystemRule, strength: float, note: str
+) -> Block:
+    """Return the strength of a rule as a number and a bar, with its class or a note."""
     own, name = "", ""
     if isinstance(rule, Rule):
         own, name = f" {class_mark(model.classes.index(rule.then))}", rule.then
@@ -154,7 +159,8 @@ def _strength(model: Document, rule: Rule | SystemRule, strength: float) -> Bloc
         mark("rect", 0.0, top + 4.0, wide * min(strength, 1.0), 8.0, f"bar{own}"),
         mark("words", wide + 6.0, top + 12.0, _short(strength), "small"),
     ]
-    return marks, top + 18.0
+    words, high = text_block(0.0, top + 14.0, note, _END)
+    return [*marks, *words], top + 18.0 + high
 
 
 def _short(value: float) -> str:

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.model import (
@@ -158,6 +159,14 @@ def test_weighted_numbers_are_spikes_as_high_as_their_rules() -> None:
     high = [float(base) - float(top) for base, top in spikes]
     assert high[:3] == pytest.approx([30 * value for value in strengths], abs=0.1)
     assert consequents(system, {"service": 3.0, "food": 8.0})["tip"][1] == []
+
+
+def test_a_proposition_about_an_output_is_named_beside_the_strength() -> None:
+    system = fan()
+    again = SystemRule(Proposition("speed", ("slow",)), (Conclusion("speed", "fast"),))
+    blocks = (*system.blocks, RuleBlock((again,), implication="minimum"))
+    svg = ft.draw(replace(system, blocks=blocks), row={"heat": 2.5}).svg
+    assert "with speed as concluded before" in " ".join(words(svg))
 
 
 def long_rules(count: int) -> RuleBase:
