@@ -146,7 +146,7 @@ def _answered(session: str, folder: Path) -> Iterator[str]:
 
 def _pictures(page: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
     """Yield the pictures that a page shows and its commands have drawn in `out/`."""
-    for name in re.findall(r"!\[[^]]*\]\((\S+\.svg)\)", page.read_text("utf-8")):
+    for name in re.findall(r"!\[[^]]*\]\(([^)\s]+\.svg)\)", page.read_text("utf-8")):
         shown = page.parent / name
         if (drawn := folder / "out" / shown.name).exists():
             yield shown, drawn
