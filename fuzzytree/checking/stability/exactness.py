@@ -26,7 +26,6 @@ from fuzzytree.checking.stability.runs import (
     loaded_form,
     loaded_forms,
     other_bits,
-    truth,
 )
 from fuzzytree.checking.stability.sensitivity import input_scales
 from fuzzytree.checking.stability.transforms import UnitChange, in_units, moved
@@ -74,10 +73,7 @@ def exactness(
     first: FirstOutcomes = {}
     for one in loaded_forms(model, runtimes, trial.skipped):
         rows = one.some(values)
-        key = (one.representation, rows.shape[1])
-        if key not in right:
-            right[key] = truth(one.model, rows)
-        check = exact_check(one, rows, right[key])
+        check = exact_check(one, rows, right)
         trial.add(check.rows, *check.faults, worst=check.worst)
         trial.faults += other_bits(one, rows, check.outcome, first)
         own = f" in {one.runtime.name}" if one.runtime.bound is not None else ""
@@ -142,13 +138,11 @@ def offsets(
                 continue
             away = rows + np.array([*steps.values()]).reshape(-1, 1)
             values = np.concatenate([probe_values(far, _PROBES), away], axis=1)
-            right = truth(far, values)
+            right: dict[tuple[str, int], Truth] = {}
             loaded = [loaded_form(where, far, one, trial.skipped) for one in chosen]
             checks: list[tuple[ExactCheck, Dtype]] = []
             for one in filter(None, loaded):
-                some = one.some(values)
-                known = right if some.shape == values.shape else None
-                check = exact_check(one, some, known)
+                check = exact_check(one, one.some(values), right)
                 trial.add(check.rows, *check.faults, worst=check.worst)
                 checks.append((check, one.runtime.dtype))
             chosen = [one.runtime for one in loaded if one is not None]
@@ -277,7 +271,7 @@ def _try_terms(
             continue
         if terms.left_out:
             trial.skipped.append(f"{terms.left_out} of the terms: there are too many")
-        right = truth(terms.model, terms.values)
+        right: dict[tuple[str, int], Truth] = {}
         name = title.format(representation)
         defined: dict[tuple[bool, int], TermDegrees | None] = {}
         for runtime in runtimes:
@@ -298,8 +292,7 @@ def _try_terms(
                 defined[key] = _term_degrees(terms.model, values, is_single=key[0])
             if (wanted := defined.get(key)) is not None:
                 trial.faults += _edge_faults(one, terms, wanted, outcome.strengths)
-            is_all = values.shape == terms.values.shape
-            check = exact_check(one, values, right if is_all else None)
+            check = exact_check(one, values, right)
             trial.add(outcome.strengths.size, *check.faults, worst=check.worst)
 
 

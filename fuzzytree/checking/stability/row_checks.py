@@ -17,6 +17,7 @@ from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import (
     FirstOutcomes,
     LoadedForm,
+    Truth,
     exact_check,
     first_line,
     loaded_form,
@@ -240,6 +241,7 @@ def specials(
         return trial.result()
     rows = special_rows(model, values)
     first: FirstOutcomes = {}
+    right: dict[tuple[str, int], Truth] = {}
     for one in loaded_forms(model, runtimes, trial.skipped):
         tried = one.some(rows)
         outcome, warning = one.run_with_warning(tried)
@@ -247,7 +249,7 @@ def specials(
         trial.faults += _broken_policy(one, tried, outcome)
         is_zero = tried == 0.0
         if model.outputs:  # a number may have the sign of an input
-            trial.faults += exact_check(one, tried).faults
+            trial.faults += exact_check(one, tried, right).faults
         elif is_zero.any():
             turned = one.run(np.where(is_zero, -tried, tried))
             if one.fault("", tried, turned, outcome)[1]:

@@ -221,14 +221,18 @@ def truth(model: Document, values: FloatArray) -> Truth:
 
 
 def exact_check(
-    one: LoadedForm, values: FloatArray, right: Truth | None = None
+    one: LoadedForm, values: FloatArray, known: dict[tuple[str, int], Truth]
 ) -> ExactCheck:
-    """Run rows and compare the predictions with the right ones, if known already.
+    """Run rows and compare the predictions with the right ones.
 
+    These are kept in `known`, by form and number of rows, for one table or its share.
     Rows that are missing in the number type and not in double (beyond float32) are
     left to criterion N6.
     """
-    right = truth(one.model, values) if right is None else right
+    key = one.representation, values.shape[1]
+    if key not in known:
+        known[key] = truth(one.model, values)
+    right = known[key]
     outcome = one.run(values)
     if isinstance(right, Outcome):
         compared = compare(*one.compared(outcome, right, values))
