@@ -26,6 +26,7 @@ SAME = {
     "--output": "the file to write",
     "--picture": "the picture to draw; `bench` draws several",
     "--reject": "the strength below which an object is unknown",
+    "--row": "a row by its values: what is explained, or drawn",
     "--runtime": "what runs the model; `run` takes one",
     "--seed": "the seed of what is random",
     "--select": "what to do of all there is",
