@@ -39,6 +39,7 @@ CODE = re.compile(
 )
 TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
 MOST_ROWS = 40
+PICTURE = re.compile(r'<p>(<img [^>]*src="([^"]+)"[^>]*>)</p>')
 OPTION = re.compile(r"<code>(-[^<\n]{1,30})</code>")
 COMMAND = re.compile(r'^<span class="gp">.*?</span>(.*)$', re.MULTILINE)
 
@@ -86,9 +87,10 @@ def on_page_content(html: str, **_: object) -> str:
     """Return a page with sessions that copy well, and long tables behind a link.
 
     A session is copied without its prompts and output. Tables of options stay open,
-    and an option stays on one line.
+    an option stays on one line, and a picture opens in its full size.
     """
     html = OPTION.sub(r'<code class="whole">\1</code>', html)
+    html = PICTURE.sub(r'<p><a href="\2">\1</a></p>', html)
     return TABLE.sub(_behind_link, CODE.sub(_with_commands, html))
 
 

@@ -199,6 +199,12 @@ def test_an_option_stays_on_one_line() -> None:
     assert html == '<code class="whole">--front</code> <code>a-b</code>'
 
 
+def test_a_picture_opens_in_its_full_size() -> None:
+    html = HOOKS["on_page_content"]('<p><img alt="A" src="a.svg" /></p>')
+    assert html == '<p><a href="a.svg"><img alt="A" src="a.svg" /></a></p>'
+    assert HOOKS["on_page_content"](html) == html
+
+
 def test_the_site_has_a_model_to_try_and_leads_from_old_pages(
     tmp_path: Path,
 ) -> None:
