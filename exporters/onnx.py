@@ -270,6 +270,7 @@ def _model_proto(
     from onnx import TensorProto
 
     from fuzzytree.exporters import onnx_ends
+    from fuzzytree.exporters.onnx_blocks import program_graph, rows_at_once
     from fuzzytree.exporters.onnx_graph import (
         NUMBERS,
         OnnxGraph,
@@ -277,7 +278,6 @@ def _model_proto(
         np_to_onnx,
     )
     from fuzzytree.exporters.onnx_rules import rules_graph
-    from fuzzytree.exporters.onnx_steps import program_graph, rows_at_once
     from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
 
     numbers = NUMBERS[dtype]

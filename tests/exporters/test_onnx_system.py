@@ -11,10 +11,10 @@ import pytest
 
 from fuzzytree.checking.converting import read
 from fuzzytree.errors import DisagreementError, LossError, ReadError
-from fuzzytree.exporters import onnx_steps
+from fuzzytree.exporters import onnx_blocks, onnx_steps
 from fuzzytree.exporters.onnx import OPSETS, Output, write_onnx
+from fuzzytree.exporters.onnx_blocks import is_wide
 from fuzzytree.exporters.onnx_compare import contents, differences
-from fuzzytree.exporters.onnx_steps import is_wide
 from fuzzytree.formats.formulas import parse
 from fuzzytree.model import (
     And,
@@ -287,6 +287,6 @@ def test_wide_nodes_give_the_answers_of_single_ones(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     system = random_system(seed, formulas="none")
-    monkeypatch.setattr(onnx_steps, "MOST_SINGLE", 0)
-    monkeypatch.setattr(onnx_steps, "_SHORTEST_CHAIN", 3)
+    monkeypatch.setattr(onnx_blocks, "MOST_SINGLE", 0)
+    monkeypatch.setattr(onnx_blocks, "_SHORTEST_CHAIN", 3)
     write_onnx(system, outputs=ALL)  # it is verified
