@@ -78,6 +78,8 @@ def row_of(text: str | None, words: str = "--row") -> dict[str, float | str] | N
         name, _, value = part.rpartition("=")
         if not name.strip():
             raise click.UsageError(f"{words} {text}: must be NAME=VALUE,NAME=VALUE,...")
+        if name.strip() in found:
+            raise click.UsageError(f"{words} {text}: {name.strip()!r} stands twice")
         found[name.strip()] = value
     return found
 

@@ -127,7 +127,7 @@ def _changes(of: Explanation) -> Iterator[str]:
     elif change.verdict == "NONE":
         yield f"no change that is allowed gives {goal}: proved on the whole domain"
     elif change.verdict == "OPEN":
-        yield f"none to {goal} is known: {change.why}"
+        yield f"no change to {goal} is known: {change.why}"
     else:
         proof = "proved smallest"
         if change.verdict == "BOUNDED":
@@ -153,7 +153,13 @@ def _cost(cost: float, of: Explanation) -> str:
 
 def _fired(of: Explanation) -> Iterator[str]:
     for rule in of.fired[:_MOST_RULES]:
-        shares = [f"{100 * part:.3g}% of {name}" for name, part in rule.shares.items()]
+        shares = [
+            f"{100 * part:.3g}%" if part >= 0.001 else "<0.1%"
+            for part in rule.shares.values()
+        ]
+        shares = [
+            f"{part} of {name}" for part, name in zip(shares, rule.shares, strict=True)
+        ]
         degree = f"rule {rule.rule}, degree {_short(rule.degree)}"
         yield f"{degree}, {some(shares, _MOST_NAMES)}: {rule.sentence}"
     if rest := of.fired[_MOST_RULES:]:

@@ -123,6 +123,7 @@ def test_categories_dates_and_whole_numbers_change_as_what_they_are(
     [
         ((), "name one row: with --row, or with --data and --number"),
         (("--row", "force=3"), "the row has no column 'slip', which the model needs; "),
+        (("--row", "slip=1,slip=2"), "--row slip=1,slip=2: 'slip' stands twice"),
         (("--row", "force"), "--row force: must be NAME=VALUE,NAME=VALUE,..."),
         (("--row", "force=3,slip=wet"), "the row, row 1: column 'slip' holds text"),
         (("--wanted", "hard"), "no class 'hard'; there is open, soft, firm"),

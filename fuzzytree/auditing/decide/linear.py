@@ -80,24 +80,62 @@ def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | N
     return _simplify(point, ranges, kept)
 
 
-def least(ranges: Sequence[Range], rows: Sequence[Row], place: int) -> Fraction | None:
-    """Return the least value of a variable that satisfies all inequalities.
+def least_radius(
+    centre: Sequence[Fraction],
+    widths: Sequence[Fraction | None],
+    limits: Sequence[Range],
+    rows: Sequence[Row],
+    low: Fraction,
+) -> Fraction | None:
+    """Return the least radius of a box around a centre that satisfies all inequalities.
 
-    Open ends count as closed ones. None if nothing satisfies the inequalities.
+    Where a box does not, a sum of the rows says so, which gives the next radius.
+
+    Args:
+        centre: The middle of the box.
+        widths: How far each variable moves for a radius of 1; None if freely.
+        limits: Within which variables move; boxes from `low` on reach into them.
+        rows: The inequalities; open ends count as closed ones.
+        low: The least radius that counts.
+
+    Returns:
+        None if nothing within the limits satisfies the inequalities.
 
     Example:
         >>> unit = (Fraction(0), Fraction(1))
         >>> both = Row({0: Fraction(1), 1: Fraction(2)}, low=Fraction(2))
-        >>> least([unit, unit], [both], 1)
-        Fraction(1, 2)
+        >>> str(least_radius([ZERO, ZERO], [ONE, ONE], [unit, unit], [both], ZERO))
+        '2/3'
     """
-    low, high = ranges[place]
-    goal = Row({place: ONE}, high=high, is_open_high=True)
-    every = [*(_close(row, ZERO) for row in rows), goal]
-    tableau = _Tableau(ranges, every, [_reach(ranges, row) for row in every])
-    if not tableau.repair():
-        return None
-    return high - tableau.raise_slack() * (high - low)
+    closed = [_close(row, ZERO) for row in rows]
+    while True:
+        box = [
+            ends
+            if width is None
+            else (max(ends[0], x - low * width), min(ends[1], x + low * width))
+            for ends, x, width in zip(limits, centre, widths, strict=True)
+        ]
+        tableau = _Tableau(box, closed, [ONE] * len(closed))
+        if tableau.repair():
+            return low
+        weights, goal = tableau.conflict()
+        room: list[tuple[Fraction, Fraction]] = []  # the radius that spends it, per 1
+        for place, weight in weights.items():
+            end, x, width = limits[place][weight > 0], centre[place], widths[place]
+            if width is None or (end - x) * weight <= 0:
+                goal -= weight * end
+            else:
+                goal -= weight * x
+                room.append((abs(end - x) / width, abs(weight) * width))
+        slope = sum((rate for _, rate in room), ZERO)
+        for radius, rate in sorted(room):
+            if slope * radius >= goal:
+                break
+            goal -= rate * radius
+            slope -= rate
+        if not slope:
+            return None
+        low = goal / slope
 
 
 def holds(row: Row, values: Sequence[Fraction]) -> bool:
@@ -223,6 +261,23 @@ class _Tableau:
                 self._pivot(blocking, moving)
             elif moving == self.slack:
                 return self.values[self.slack]
+
+    def conflict(self) -> tuple[dict[int, Fraction], Fraction]:
+        """Return weights of the given variables, and what their sum must reach.
+
+        All points of the rows satisfy it; it is why `repair` failed.
+        """
+        broken = next(n for n in sorted(self.sums) if self._gap(n))
+        sign = 1 if self._gap(broken) > 0 else -1
+        weights: dict[int, Fraction] = {}
+        goal = ZERO
+        for number, weight in {broken: -ONE, **self.sums[broken]}.items():
+            low, high = self.bounds[number]
+            if high is not None:  # a given variable
+                weights[number] = sign * weight
+            elif low is not None:
+                goal -= sign * weight * low
+        return weights, goal
 
     def _gap(self, number: int) -> Fraction:
         """Return what a variable lacks to its bounds: positive if it must rise."""

@@ -24,15 +24,16 @@ from fuzzytree.auditing.decide.linear import (
     Row,
     feasible,
     holds,
+    least_radius,
     row_of,
     simple,
 )
-from fuzzytree.auditing.decide.linear import least as least_value
 from fuzzytree.auditing.decide.regions import boxes, cut_side, leaf_at, regions
 from fuzzytree.model import FloatArray, FuzzyTree, Variable
 from fuzzytree.numerics import U, outwards
 
-_STEPS = 2_000  # of a linear program, about
+_STEPS = 2_000  # of a linear program of up to `_SMALL` weights, about
+_SMALL = 16
 _MOST_PARTS = 2_000  # that splits make
 
 
@@ -230,9 +231,11 @@ class Polytopes:
         sums = [row for row in part.sums if row.weights]
         if any(not holds(row, at) for row in part.sums if not row.weights):
             return None
+        size = sum(len(row.weights) for row in sums)
+        steps = _STEPS * max(1, size // _SMALL)
         if sums:
-            budget.spend(_STEPS)
-            result = _least(sums, part.rows, limits, at, rates, low)
+            budget.spend(steps)
+            result = _least(sums, limits, at, rates, low)
             if result is None:
                 return None
             low = max(low, result)
@@ -247,7 +250,7 @@ class Polytopes:
             if any(not s.has(v) for s, v in zip(sides, values, strict=True)):
                 return None
             return low, values
-        budget.spend(_STEPS)
+        budget.spend(steps)
         radius = simple(low + step / 2, low + step)
         ball = [
             (max(a, x - radius / rate), min(b, x + radius / rate)) if rate else (a, b)
@@ -318,7 +321,6 @@ def _split(part: Polytope, side: DomainSide, x: Fraction) -> list[Polytope]:
 
 def _least(
     sums: Sequence[Row],
-    every: Sequence[Row],
     limits: Sequence[tuple[Fraction, Fraction]],
     at: Sequence[Fraction],
     rates: Sequence[Fraction],
@@ -327,20 +329,13 @@ def _least(
     """Return the least cost at which sums are within limits; None if they never are."""
     used = sorted({place for row in sums for place in row.weights})
     number = {place: n for n, place in enumerate(used)}
-    radius = len(used)
     rows = [
         row._replace(weights={number[p]: w for p, w in row.weights.items()})
-        for row in every
-        if number.keys() >= row.weights.keys()
+        for row in sums
     ]
-    for place, n in number.items():
-        if rates[place]:
-            x, width = at[place], 1 / rates[place]
-            rows.append(Row({n: ONE, radius: width}, low=x))
-            rows.append(Row({n: ONE, radius: -width}, high=x))
-    most = [max(abs(end - at[p]) * rates[p] for end in limits[p]) for p in used]
-    ranges = [*(limits[place] for place in used), (low, max(low, *most, ONE))]
-    return least_value(ranges, rows, radius)
+    widths = [1 / rates[place] if rates[place] else None for place in used]
+    centre, ends = [at[place] for place in used], [limits[place] for place in used]
+    return least_radius(centre, widths, ends, rows, low)
 
 
 def _plainer(

@@ -26,7 +26,7 @@ from fuzzytree.model import (
 from fuzzytree.rechecking import MISSING
 from fuzzytree.semantics import Status, answer_of, filled_row
 
-_STEPS = 2_000_000  # of the search for the smallest change, about 2 s
+_STEPS = 20_000_000  # of the search for the smallest change, at most about 20 s
 
 
 def explain_row(

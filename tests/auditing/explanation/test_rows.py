@@ -205,7 +205,8 @@ def test_a_missing_value_is_filled_in_where_something_stands_for_it() -> None:
     assert (explanation.status, explanation.label) == ("missing", None)
     assert str(explanation) == (
         "mixture: no class, as a value is missing\n"
-        "change     none to another class is known: nothing stands for a missing y, sum"
+        "change     no change to another class is known: nothing stands for a missing "
+        "y, sum"
     )
 
 
