@@ -94,8 +94,10 @@ def row_of(model: Document, row: object, number: int = 1) -> dict[str, float]:
         values[0] = [*cells.values()]
         whole = table(values, columns=[*cells], format=whole.format)
         name, number = "the row", 1
-    seen, variables = 0, model.variables
-    for batch in batches(whole, model.inputs, name=name, variables=variables):
+    seen, variables, trained = 0, model.variables, model.columns
+    for batch in batches(
+        whole, model.inputs, trained=trained, name=name, variables=variables
+    ):
         name, count = batch.piece.name, batch.values.shape[1]
         if seen < number <= seen + count:
             numbers = batch.values[:, number - 1 - seen].tolist()

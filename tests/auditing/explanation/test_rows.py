@@ -7,6 +7,7 @@ import math
 import random
 from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
 import pytest
 from msgspec.structs import replace
@@ -230,6 +231,12 @@ def test_a_row_may_be_of_a_frame_or_a_frame() -> None:
     assert ft.why(mixture(), frame, number=2).rule == 1
     with pytest.raises(TableError, match="has 2 rows, and no row 3"):
         ft.why(mixture(), frame, number=3)
+
+
+def test_an_array_has_the_columns_that_the_model_was_learnt_from() -> None:
+    values = np.array([[0.0, 1.0], [0.0, 1.5], [0.0, 7.0], [0.0, 7.5]])
+    tree = ft.learn(values, target=["soft", "soft", "firm", "firm"], leaves=2)
+    assert ft.why(tree, values, number=3).label == "firm"
 
 
 def test_what_is_no_category_is_refused() -> None:
