@@ -372,7 +372,8 @@ def refine(lines: Lines, xs: Sequence[Fraction]) -> Lines:
             columns.append((lines.at[piece], *ends))
         else:
             a, b = lines.x[piece : piece + 2]
-            columns.append((_on(a, b, *lines.ends(piece), x),) * 3)
+            value = _on(a, b, *lines.ends(piece), x)
+            columns.append((value, value, value))
     at, after, before = zip(*columns, strict=True)
     return Lines(tuple(xs), at, after[:-1], before[1:])
 
