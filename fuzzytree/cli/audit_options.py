@@ -66,13 +66,19 @@ row_option = option(
 
 
 def row_of(text: str | None, words: str = "--row") -> dict[str, float | str] | None:
-    """Return values by name, as they are written, perhaps with commas.
+    """Return values by name, as they are written, perhaps with commas, or as JSON.
 
     Raises:
-        click.UsageError: If it is not NAME=VALUE,...
+        click.UsageError: If it is neither NAME=VALUE,... nor an object of JSON.
     """
     if text is None:
         return None
+    if text.startswith("{"):
+        try:
+            return msgspec.json.decode(text, type=dict[str, float | str])
+        except msgspec.MsgspecError as error:
+            must = 'must be {"NAME": VALUE, ...} with numbers and texts'
+            raise click.UsageError(f"{words} {text}: {must}") from error
     found: dict[str, float | str] = {}
     for part in re.split(r",(?=[^,]*=)", text):
         name, _, value = part.rpartition("=")

@@ -118,6 +118,18 @@ def test_categories_dates_and_whole_numbers_change_as_what_they_are(
     assert "seen       " in out
 
 
+def test_a_row_of_any_names_and_texts_is_written_in_json(
+    call: Call, folder: Path
+) -> None:
+    lines = [f'{size},"{wood}",{wood}' for size in range(40) for wood in ("a=1", "b")]
+    (folder / "odd.csv").write_text("\n".join(['"size, cm",a=b,y', *lines]))
+    ft.save(ft.learn("odd.csv", target="y", columns_per_node=1), "odd.yaml")
+    code, out, err = call("why", "odd.yaml", "--row", '{"size, cm": 3, "a=b": "a=1"}')
+    assert (code, err) == (0, "")
+    assert out.startswith("odd: a=1 by rule ")
+    assert "change     to b: a=b a=1 -> b; a whole range; proved smallest" in out
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -125,6 +137,7 @@ def test_categories_dates_and_whole_numbers_change_as_what_they_are(
         (("--row", "force=3"), "the row has no column 'slip', which the model needs; "),
         (("--row", "slip=1,slip=2"), "--row slip=1,slip=2: 'slip' stands twice"),
         (("--row", "force"), "--row force: must be NAME=VALUE,NAME=VALUE,..."),
+        (("--row", '{"force":'), '--row {"force":: must be {"NAME": VALUE, ...} with'),
         (("--row", "force=3,slip=wet"), "the row, row 1: column 'slip' holds text"),
         (("--wanted", "hard"), "no class 'hard'; there is open, soft, firm"),
         (("--fixed", "forse"), "no input 'forse'; there is force, slip (did you mean "),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import struct
 from collections.abc import Callable
 from importlib import import_module
@@ -16,6 +17,7 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
+from fuzzytree.cli.audit_options import row_of
 from fuzzytree.model import Document
 from fuzzytree.testing import random_tree
 from tests.interop.matrix_models import write_model
@@ -200,6 +202,19 @@ def test_a_row_comes_from_the_address_and_goes_into_it(
     wait_until(seen, lambda: seen.browser.current_url.endswith("10&area=41"))
     assert seen.run(command) == "fuzzytree why MODEL --row pressure=10,area=41"
     assert "no class" in seen.run(answer)
+
+
+def test_the_command_has_a_row_of_odd_names_in_json(
+    browser: Any, tmp_path: Path
+) -> None:
+    table = tmp_path / "odd.csv"
+    lines = [f'{size},"it\'s, b",{size > 20}' for size in range(40)]
+    table.write_text("\n".join(['"size, cm",a=b,y', *lines]))
+    seen = opened(browser, tmp_path, ft.page(ft.learn(table, target="y"), table))
+    command = seen.run("return document.getElementById('command').textContent")
+    row = row_of(shlex.split(command)[-1])
+    assert row is not None
+    assert row["size, cm"] == "0"
 
 
 def test_categories_are_chosen_by_name_and_a_missing_value_is_replaced(

@@ -260,7 +260,9 @@ const showWhy = (answer, strengths, found) => {
   $("why").replaceChildren(...parts);
 };
 const showCommand = () => {
-  const row = inputs.map((one, k) => `${one.name}=${cell(one, values[k])}`).join(",");
+  const pairs = inputs.map((one, k) => [one.name, cell(one, values[k])]);
+  const isPlain = !pairs.flat().some((word) => /[,=]|^[\s{]|\s$/.test(word));
+  const row = isPlain ? pairs.map((pair) => pair.join("=")).join(",") : JSON.stringify(Object.fromEntries(pairs));
   const quoted = /^[\w.,=@%+:/-]+$/.test(row) ? row : `'${row.replaceAll("'", "'\\''")}'`;
   $("command").textContent = `${facts.command} --row ${quoted}`;
 };
