@@ -1274,7 +1274,7 @@ def _refuse_absent(piece: TablePiece, wanted: Sequence[str], why: str) -> None:
     if not absent:
         return
     dots = ["..."] * (len(piece.columns) > _MOST_NAMES)
-    known = ", ".join([*piece.columns[:_MOST_NAMES], *dots])
+    known = ", ".join([*piece.columns[:_MOST_NAMES], *dots]) or "none"
     close = difflib.get_close_matches(absent[0], piece.columns, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close and len(absent) == 1 else ""
     word = "column" if len(absent) == 1 else "columns"
@@ -1286,7 +1286,7 @@ def _refuse_absent(piece: TablePiece, wanted: Sequence[str], why: str) -> None:
 def _header_hint(columns: Sequence[str]) -> str:
     """Return what reads a table whose first row is data, if it looks like that."""
     numbers = sum(math.isfinite(number_of(c) or math.nan) for c in columns)
-    if 2 * numbers < len(columns):
+    if not columns or 2 * numbers < len(columns):
         return ""
     text = "its first row looks like data; pass --no-header to name the columns"
     return f"\n  {text} 'column 1', 'column 2', ..."

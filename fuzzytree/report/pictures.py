@@ -26,6 +26,10 @@ class Picture(NamedTuple):
 
     svg: str
 
+    def __repr__(self) -> str:
+        """Show how large the picture is; `svg` is its text."""
+        return f"Picture({len(self.svg.encode())} bytes)"
+
     def _repr_svg_(self) -> str:
         """Return what a notebook shows."""
         return self.svg

@@ -57,6 +57,10 @@ class Page(NamedTuple):
     rows: int = 0
     total: int = 0
 
+    def __repr__(self) -> str:
+        """Show how large the page is; `html` is its text."""
+        return f"Page({len(self.html.encode())} bytes, {self.rows} rows)"
+
     def save(self, path: PathLike) -> None:
         """Write the page to a file whole, or leave what stood there.
 

@@ -131,7 +131,8 @@ def _changes(of: Explanation) -> Iterator[str]:
     else:
         proof = "proved smallest"
         if change.verdict == "BOUNDED":
-            proof = f"no change below {_cost(change.low, of)} does it; {change.why}"
+            low = f"no change below {_cost(change.low, of)} does it"
+            proof = f"{low if change.low else 'not proved smallest'}; {change.why}"
         yield f"{_moves(change, of)}; {proof}"
     if alone is not None:
         proof = f"no input alone gives {goal}: proved"

@@ -226,7 +226,7 @@ def test_a_row_must_fit() -> None:
         ({}, "the row has no value of 'heat'"),
         ({"heat": "hot"}, "'heat' cannot be 'hot'; it is a number"),
         (
-            {"hat": 1.0, "heat": 1.0},
+            {"hat": 1.0},
             "the row has a value of 'hat', which is no input; there is heat "
             "(did you mean 'heat'?)",
         ),
@@ -234,3 +234,9 @@ def test_a_row_must_fit() -> None:
         with pytest.raises(ValueError, match=r".") as caught:
             ft.draw(fan(), row=row)
         assert str(caught.value) == message
+
+
+def test_a_row_may_have_columns_that_the_model_does_not_use() -> None:
+    picture = ft.draw(fan(), row={"room": "kitchen", "heat": 1.0})
+    assert picture == ft.draw(fan(), row={"heat": 1.0})
+    assert repr(picture) == f"Picture({len(picture.svg.encode())} bytes)"

@@ -86,7 +86,7 @@ def audit(
     check_settings(settings)
     wanted = code_selection(selection.select, selection.skip)
     if row is not None:
-        row_values(model, row)
+        row = row_values(model, row)
     viewed = view(model, domain or domain_of(model))
     reasons: dict[str, str] = {}
     if viewed.rules is not None and viewed.rules.kind == "relative":

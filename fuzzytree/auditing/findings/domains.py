@@ -374,11 +374,11 @@ def row_values(
 ) -> dict[str, float]:
     """Return the values of a row by input, from numbers or the words of its table.
 
-    A partial row may lack inputs.
+    A partial row may lack inputs; a whole one may have further columns.
 
     Raises:
-        ValueError: If a name is no input, a value is not finite or no category, or the
-            row lacks an input.
+        ValueError: If the row lacks an input or a name of a partial one is no input, or
+            if a value is not finite or no category.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -389,9 +389,12 @@ def row_values(
         True
     """
     columns = {one.name: one for one in model.variables if not one.parts}
+    absent = [name for name in columns if name not in row]
     values: dict[str, float] = {}
     for name, cell in row.items():
         if name not in columns:
+            if not (absent or is_partial):
+                continue  # a column of the table that the model does not use
             raise ValueError(
                 f"the row has a value of {name!r}, which is no input; "
                 f"{name_choice(name, columns)}"
@@ -400,7 +403,6 @@ def row_values(
         if not math.isfinite(value):
             raise ValueError(f"the row's {name!r} must be finite, not {value!r}")
         values[name] = float(value)
-    absent = [name for name in columns if name not in values]
     if absent and not is_partial:
         raise ValueError(f"the row has no value of {', '.join(map(repr, absent))}")
     return values

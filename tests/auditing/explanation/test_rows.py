@@ -248,6 +248,13 @@ def test_what_is_no_category_is_refused() -> None:
     )
 
 
+def test_an_empty_row_is_refused_in_a_sentence() -> None:
+    tree = random_tree(1, leaves=2)
+    with pytest.raises(TableError) as caught:
+        ft.why(tree, {})
+    assert str(caught.value).endswith("which the model needs; it has none")
+
+
 def test_numbers_are_classes_where_labels_are() -> None:
     tree = ft.learn(
         pd.DataFrame({"cm": [1.0, 1.5, 7.0, 7.5]}), target=[0, 0, 1, 1], leaves=2
