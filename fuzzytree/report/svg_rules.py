@@ -5,22 +5,19 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from fuzzytree.model import (
     DATE_UNIT,
-    And,
-    Condition,
     Document,
-    Not,
-    Or,
     Proposition,
     Rule,
     SystemOutput,
     SystemRule,
     Variable,
+    questions,
 )
 from fuzzytree.report.drawing import (
     Axis,
@@ -111,7 +108,7 @@ def draw_rules(
         strength = answer.strengths[k - 1]
         blocks = scene.cells(rule)
         blocks += [scene.conclusion(rule, k, output) for output in base.outputs]
-        names = (p.variable for p in _propositions(rule.when))
+        names = (p.variable for p in _propositions(rule))
         before = [name for name in names if name not in scene.variables]
         note = f"with {', '.join(before)} as concluded before" if before else ""
         blocks.append(_strength(base, rule, strength, note))
@@ -190,9 +187,9 @@ class _Scene:
         self.values = dict(input_values(model.variables, row))
         self.variables = {one.name: one for one in model.variables}
         rules: Rules = model.rules
-        names = {p.variable for rule in rules for p in _propositions(rule.when)}
+        names = {p.variable for rule in rules for p in _propositions(rule)}
         self.columns = [one for one in model.variables if one.name in names]
-        counts = [len({p.variable for p in _propositions(r.when)}) for r in rules]
+        counts = [len({p.variable for p in _propositions(r)}) for r in rules]
         self.is_table = len(self.columns) <= max(_COLUMNS, *counts)
         self.width = len(self.columns) if self.is_table else max(counts)
         self.conclusions = consequents(model, row)
@@ -212,7 +209,7 @@ class _Scene:
         Each variable has its column, or where these are many only its name.
         """
         plots: dict[str, list[Block]] = {one.name: [] for one in self.columns}
-        for proposition in _propositions(rule.when):
+        for proposition in _propositions(rule):
             name = proposition.variable
             if name in plots:
                 x, curve = self.scales[name], self._curve(proposition)
@@ -323,19 +320,5 @@ def _plot(
     return marks, y.start + 4.0
 
 
-def _propositions(
-    when: Condition | Sequence[Condition] | None,
-) -> Iterator[Proposition]:
-    """Yield the propositions of a condition, from left to right."""
-    match when:
-        case None:
-            return
-        case Proposition():
-            yield when
-        case Not(part=part):
-            yield from _propositions(part)
-        case And(parts=parts) | Or(parts=parts):
-            yield from _propositions(parts)
-        case _:
-            for part in when:
-                yield from _propositions(part)
+def _propositions(rule: Rule | SystemRule) -> Iterable[Proposition]:
+    return rule.when if isinstance(rule, Rule) else questions(rule.when)

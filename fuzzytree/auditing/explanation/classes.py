@@ -96,10 +96,8 @@ class ClassDecision:
         result = replace(result, strengths=strengths)
         if result.rule:
             rule = self.rules.rules[result.rule - 1]
-            because, counts = (
-                tuple(self._reasons(rule)),
-                dict(zip(classes, rule.counts, strict=False)),
-            )
+            counts = dict(zip(classes, rule.counts, strict=False))
+            because = tuple(self._reasons(rule))
             result = replace(result, because=because, counts=counts)
             if self.rules.semantics.sharpness is not msgspec.UNSET:
                 shares = row_probabilities(self.rules, self.fired)
