@@ -340,7 +340,7 @@ def _classes(results: dict[str, Facts]) -> str:
             cells.append([f"{count:,}", f"{20 * count:,}", size, *shown])
     return (
         "A state grows with classes times columns, and with the rows that it keeps, "
-        "5,000 of a class at most. Twenty rows of each class here.\n\n" + _rows(cells)
+        "20,000 of a class at most. Twenty rows of each class here.\n\n" + _rows(cells)
     )
 
 

@@ -159,6 +159,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         class_weight: By what the weights of a class' rows are multiplied: a number by
             label, 1 for labels that are not named; or `balanced`, for all classes to
             weigh the same.
+        rows_per_class: How many rows of a class are kept at most, as many as
+            `report_.sampled` says; None for up to 20,000.
         seed: Moves the folds of held-out rows. The same seed and table give the
             same tree. `fuzzytree.learning.LearningSettings` says more about each.
 
@@ -209,6 +211,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         entry: float = 2.0,
         costs: Mapping[str, float] | None = None,
         class_weight: LabelWeight = None,
+        rows_per_class: int | None = None,
         seed: int = 0,
     ) -> None:
         self.mode = mode
@@ -225,6 +228,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         self.entry = entry
         self.costs = costs
         self.class_weight = class_weight
+        self.rows_per_class = rows_per_class
         self.seed = seed
 
     def fit(

@@ -172,6 +172,19 @@ def test_chunks_of_any_size_give_the_tree_of_the_whole_table() -> None:
         assert model.tree_ == whole.tree_
 
 
+def test_the_report_says_of_which_classes_rows_were_left_out() -> None:
+    labels = np.repeat([0, 1, 2], [20, 70, 60])
+    values = np.random.default_rng(0).normal(size=(150, 2)) + labels[:, None]
+    model = FuzzyTreeClassifier(rows_per_class=30).fit(values, labels)
+    assert model.report_.sampled == {"1": (30, 70), "2": (30, 60)}
+    text = "learned from 30 of 70 rows of class '1', 30 of 60 rows of class '2'"
+    assert text in str(model.report_)
+    assert not FuzzyTreeClassifier().fit(values, labels).report_.sampled
+    many = FuzzyTreeClassifier(rows_per_class=2, mode="paper")
+    text = str(many.fit(np.arange(20.0)[:, None], np.arange(20) // 4).report_)
+    assert "2 of 4 rows of class '2', 2 more classes" in text
+
+
 def test_chunks_may_have_whole_weights() -> None:
     weights = np.arange(150) % 4
     whole = FuzzyTreeClassifier().fit(IRIS, SPECIES, sample_weight=weights)

@@ -258,9 +258,6 @@ def _learnt(
         text = f"has one leaf: it predicts {tree.leaves[0].label!r} for every row"
         rows.append(("remark", "the tree", printable(text)))
     rows += _report_rows(learnt.report, is_verbose=options.verbose)
-    if found.weights is not None and learnt.report.rows_sampled < learnt.report.rows:
-        text = "from the rows that were kept; `collect --for` counts all rows"
-        rows.append(("estimated", "supports of leaves", text))
     tested = small = None
     if not options.no_test:
         begin = time.perf_counter()
@@ -635,10 +632,11 @@ def _report_rows(
         text = counted(report.rows_filled, "row")
         why = "a value is missing; what stands for it is part of the model"
         rows.append(("filled", text, why))
-    if report.rows_sampled < report.rows:
+    if report.sampled:
         text = counted(report.rows_sampled, "row")
-        used = "for patterns, combinations, sets and the support of leaves"
-        rows.append(("sampled", text, used))
+        rows.append(("sampled", text, f"learned from {report.sampling}"))
+        text = "from the rows that were kept; `collect --for` counts all rows"
+        rows.append(("estimated", "supports of leaves", text))
     if report.features_ignored:
         text = counted(len(report.features_ignored), "column")
         names = _names(report.features_ignored, is_verbose=is_verbose)

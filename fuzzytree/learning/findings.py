@@ -29,6 +29,8 @@ class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
             missing or not finite.
         rows_filled: Rows with a missing value, which a stand-in took the place of.
         rows_sampled: Rows kept for clusters, combinations and window counts.
+        sampled: Of each class of which not all rows were kept, how many were, and how
+            many there are.
         classes_without_rows: Classes that nothing was learnt about.
         features_ignored: Columns left out: constant, or its range overflows.
         patterns: Patterns by class name.
@@ -58,6 +60,7 @@ class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
     rows_dropped: int
     rows_sampled: int
     rows_filled: int = 0
+    sampled: dict[str, tuple[int, int]] = {}
     classes_without_rows: tuple[str, ...]
     features_ignored: tuple[str, ...]
     patterns: dict[str, int]
@@ -81,6 +84,17 @@ class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
     inner_accuracy: float | None = None
 
     @property
+    def sampling(self) -> str:
+        """Of which classes not all rows were kept, in words; empty if all were."""
+        parts = [
+            f"{kept:,} of {rows:,} rows of class {name!r}"
+            for name, (kept, rows) in self.sampled.items()
+        ]
+        rest = len(parts) - _SHOWN
+        parts[_SHOWN:] = [f"{rest} more class{'es' * (rest > 1)}"] * (rest > 0)
+        return ", ".join(parts)
+
+    @property
     def repairs(self) -> tuple[str, ...]:
         """What had to be repaired in the fitted sets, with counts; empty if nothing."""
         lines = (_counted(self, name, text) for name, text in _REPAIRS.items())
@@ -91,6 +105,8 @@ class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
         lines = [f"{self.rows} rows, {sum(self.patterns.values())} patterns"]
         nodes = ", ".join(map(str, self.features_per_node)) or "none"
         lines.append(f"{self.leaves} leaves; features per node: {nodes}")
+        if self.sampled:
+            lines.append(f"learned from {self.sampling}")
         if self.features_ignored:
             lines.append(f"columns ignored: {', '.join(self.features_ignored)}")
         lines += [_counted(self, name, text) for name, text in _TABLE.items()]
@@ -130,6 +146,9 @@ _REPAIRS = {
 }
 """Where the data departed from what the paper assumes of fuzzy sets."""
 
+
+_SHOWN = 3
+"""Classes that are named where a report counts their rows."""
 
 _MANY = 20
 """So many classes are usual, even where their names are numbers with fractions."""

@@ -388,12 +388,16 @@ class ArrayLearner:
         drops, dropped = self.settings.drops_missing, self.statistics.dropped
         rows = self.statistics.counts().sum() - (dropped if drops else 0)
         rows += self.statistics.unlabelled if drops else 0
+        counts = moments.counts if drops else self.statistics.counts()
+        kept = np.bincount(sample.codes, minlength=len(self.classes))
+        sizes = zip(self.classes, kept.tolist(), counts.tolist(), strict=True)
         return LearningReport(
             mode=self.settings.mode,
             rows=int(rows),
             rows_dropped=dropped if drops else self.statistics.unlabelled,
             rows_filled=0 if drops else dropped - self.statistics.unlabelled,
             rows_sampled=len(sample.rows),
+            sampled={name: (few, all_) for name, few, all_ in sizes if few < all_},
             classes_without_rows=tuple(
                 c for c, n in zip(self.classes, moments.counts, strict=True) if n == 0
             ),

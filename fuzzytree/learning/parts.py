@@ -28,6 +28,7 @@ from fuzzytree.errors import LearningError, ReadError, TableError
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning.findings import refuse_measurements
 from fuzzytree.learning.learner import ArrayLearner, Learnt, check_rows
+from fuzzytree.learning.sampling import usual_rows
 from fuzzytree.learning.settings import LearningSettings, SettingArguments, settings_of
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.model import DATE_UNIT, FuzzyTree, as_names, with_label_type
@@ -82,7 +83,7 @@ class StateHeader(msgspec.Struct, forbid_unknown_fields=True):
         kinds: The kinds of labels that came, see `fuzzytree.tables.coded_classes`.
         unlabelled: Rows that were left out as they have no class.
         parts: The digests of the states that were merged.
-        rows_per_class: How many rows of a class the sample keeps.
+        rows_per_class: How many rows of a class the sample keeps; 0 for the usual ones.
         dropped: Rows in which a value is missing.
         missing: Cells without a value.
         contents: What the cells of each column hold.
@@ -246,8 +247,8 @@ class Learner:
             ("columns", self.columns or other.columns, other.columns or self.columns),
             (
                 "number of rows per class",
-                [str(self.settings.rows_per_class)],
-                [str(other.settings.rows_per_class)],
+                [str(self.settings.rows_per_class or "the usual one")],
+                [str(other.settings.rows_per_class or "the usual one")],
             ),
             (
                 "set of categorical columns",
@@ -452,7 +453,8 @@ class Learner:
         with ThreadPoolExecutor(threads) as pool:
             for number, piece in enumerate(parts):
                 classes = len(rows.labels.keys)
-                if classes * len(piece.values) * most > _LARGE:
+                width = len(piece.values)
+                if classes * width * (most or usual_rows(width, 2)) > _LARGE:
                     threads = 1
                 while len(waiting) >= threads:
                     waiting.popleft().result()
@@ -512,14 +514,14 @@ class Learner:
         cls, header: StateHeader, arrays: Mapping[str, npt.NDArray[np.generic]]
     ) -> Learner:
         labels = header.labels()
-        settings = LearningSettings(rows_per_class=header.rows_per_class)
+        settings = LearningSettings(rows_per_class=header.rows_per_class or None)
         learner = cls(header.target, columns=header.columns, settings=settings)
         learner.unlabelled, learner.missing = header.unlabelled, header.missing
         learner._labels = labels
         learner._contents = dict(zip(header.columns, header.contents, strict=False))
         learner.categorical = frozenset(header.categorical)
         learner._parts = frozenset([*header.parts, header.digest])
-        sizes = len(labels.keys), len(header.columns), header.rows_per_class
+        sizes = len(labels.keys), len(header.columns), settings.rows_per_class
         learner._statistics = Statistics(*sizes, header.dropped)
         learner._statistics.fill(arrays)
         return learner
@@ -538,7 +540,7 @@ class Learner:
             classes=[name for name, _ in keys],
             floats=[is_float for _, is_float in keys],
             kinds=sorted(self._labels.kinds),
-            rows_per_class=self.settings.rows_per_class,
+            rows_per_class=self.settings.rows_per_class or 0,
             dropped=statistics.dropped,
             unlabelled=self.unlabelled,
             missing=self.missing,

@@ -31,6 +31,19 @@ _DIGITS = np.uint64((1 << 63) | ((1 << 52) - 1))
 _HALF = np.uint64(32)
 _ONE = np.uint64(1)
 _BUFFER = 1 << 15
+_FEW, _MANY, _CELLS = 5_000, 20_000, 1 << 20
+
+
+def usual_rows(columns: int, classes: int) -> int:
+    """Return how many rows of a class are kept unless a number is set.
+
+    20,000, or as many as give all classes 2^20 numbers, but 5,000 at least.
+
+    Example:
+        >>> usual_rows(11, 2), usual_rows(11, 7), usual_rows(64, 10)
+        (20000, 13617, 5000)
+    """
+    return max(_FEW, min(_MANY, _CELLS // max(columns * classes, 1)))
 
 
 @dataclass(frozen=True)
@@ -217,7 +230,9 @@ class DistinctRows:
             self._parts = [found.at(kept)] if len(kept) else []
             self._kept = self._settled = len(kept)
 
-    def sample(self, lows: FloatArray, highs: FloatArray) -> Sample:
+    def sample(
+        self, lows: FloatArray, highs: FloatArray, most: int | None = None
+    ) -> Sample:
         """Return `most` rows of each class at most, in a canonical order.
 
         Where a class has more rows than that, distinct rows have copies in proportion
@@ -226,6 +241,7 @@ class DistinctRows:
         Args:
             lows: The smallest value of each column, over the whole table.
             highs: The largest.
+            most: No more than are kept; as many unless given.
         """
         found = self.settle()
         if found is None:
@@ -237,7 +253,7 @@ class DistinctRows:
             (found.hashes, hashed_rows(units.moved(found.values)), found.codes)
         )
         found = found.at(order)
-        chosen = np.repeat(np.arange(len(order)), _shares(found, self.most))
+        chosen = np.repeat(np.arange(len(order)), _shares(found, most or self.most))
         rows = found.values[chosen]
         return Sample(rows, units.moved(rows), found.codes[chosen], units)
 

@@ -49,8 +49,9 @@ class LearningSettings(
         class_weight: By what the weights of a class' rows are multiplied, by its name
             and 1 for those not named; or `balanced`, for all classes to weigh the same.
             Supports of leaves stay those of the rows.
-        rows_per_class: How many rows of a class are kept at most; none is left out
-            where no more are distinct and there are no more.
+        rows_per_class: How many rows of a class are kept at most; the report says of
+            which classes not all were. None: 20,000, or as many as give all classes
+            2^20 numbers, but 5,000 at least.
         seed: Moves the folds of held-out rows.
         missing: `learn`: what stands for a missing or infinite value is learnt, and
             is part of the model. `drop`: such a row is left out and counted, as paper
@@ -77,7 +78,7 @@ class LearningSettings(
     separate_sides: bool = False
     costs: Mapping[str, float] = {}
     class_weight: ClassWeight = None
-    rows_per_class: int = 5_000
+    rows_per_class: int | None = None
     seed: int = 0
     missing: Literal["learn", "drop", "refuse"] = "learn"
 
@@ -171,7 +172,7 @@ class SettingArguments(TypedDict, total=False):
     separate_sides: bool
     costs: Mapping[str, float]
     class_weight: ClassWeight
-    rows_per_class: int
+    rows_per_class: int | None
     seed: int
     missing: Literal["learn", "drop", "refuse"]
 

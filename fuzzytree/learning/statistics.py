@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from fuzzytree.cells import EXACT
 from fuzzytree.columns import is_missing_code
-from fuzzytree.learning.sampling import DistinctRows, Sample
+from fuzzytree.learning.sampling import DistinctRows, Sample, usual_rows
 from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, padded, runs, sized
 from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
 
@@ -52,7 +52,8 @@ class Statistics:
     Attributes:
         classes: How many classes there are.
         features: How many columns there are.
-        rows_per_class: How many rows of each class the sample keeps at most.
+        rows_per_class: How many rows of each class the sample keeps at most; None for
+            `usual_rows`.
         dropped: Rows without a class, which are left out, and rows with a value that is
             missing or not finite, which the sums leave out.
         unlabelled: How many of these have no class.
@@ -67,7 +68,7 @@ class Statistics:
 
     classes: int
     features: int
-    rows_per_class: int = 5_000
+    rows_per_class: int | None = None
     dropped: int = 0
     unlabelled: int = 0
     _filled: int = 0
@@ -95,7 +96,8 @@ class Statistics:
         self._highs = np.full(shape, -np.inf)
         self._fractions = np.zeros(self.features, np.int64)
         self._sums = Sums(self.classes, self.features)
-        self._rows = DistinctRows(self.classes, self.features, self.rows_per_class)
+        most = self.rows_per_class or usual_rows(self.features, 2)
+        self._rows = DistinctRows(self.classes, self.features, most)
 
     def update(self, values: npt.NDArray[np.generic], codes: IntArray) -> None:
         """Take more rows.
@@ -291,9 +293,11 @@ class Statistics:
     def sample(self) -> Sample:
         """Return the rows kept, in an order that depends on the rows alone."""
         self._absorb()
+        usual = usual_rows(self.features, int(np.count_nonzero(self._counts)))
         return self._rows.sample(
             self._lows.min(axis=0, initial=np.inf),
             self._highs.max(axis=0, initial=-np.inf),
+            self.rows_per_class or min(usual, self._rows.most),
         )
 
     def of_columns(self, kept: Sequence[int]) -> Statistics:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from fractions import Fraction
 
@@ -117,6 +118,27 @@ def test_the_sample_holds_whole_rows_and_no_more_than_wanted() -> None:
     assert np.bincount(sample.codes).tolist() == [100] * 4
     known = {row.tobytes() for row in values}
     assert all(row.tobytes() in known for row in sample.rows)
+
+
+@pytest.mark.parametrize(
+    ("classes", "columns", "most"), [(2, 1, 20_000), (4, 30, 8738)]
+)
+def test_without_a_number_fewer_rows_of_many_classes_are_learned_from(
+    classes: int, columns: int, most: int
+) -> None:
+    rng = np.random.default_rng(0)
+    codes = rng.integers(0, classes, classes * most * 3 // 2)
+    values = rng.normal(size=(len(codes), columns))
+    whole = Statistics(classes + 1, columns)  # a class without rows changes nothing
+    whole.update(values, codes)
+    assert np.bincount(whole.sample().codes).tolist() == [most] * classes
+    parts = [Statistics(classes, columns) for _ in range(classes)]
+    for code, part in enumerate(parts):  # that see a class each, from the end
+        part.update(values[::-1][codes[::-1] == code], np.full(len(codes), code))
+    joined = functools.reduce(Statistics.merge, reversed(parts))
+    loaded = Statistics(classes, columns)
+    loaded.fill(joined.arrays())
+    assert bits(loaded)[-2:] == bits(joined)[-2:] == bits(whole)[-2:]
 
 
 def test_the_table_is_not_changed() -> None:
