@@ -29,11 +29,12 @@ from fuzzytree.model import (
     depth,
     label_type_of,
     leaf_paths,
+    remember,
     with_label_type,
 )
 from fuzzytree.report import Picture, draw_model
-from fuzzytree.runtimes import baseline, class_probabilities
-from fuzzytree.semantics import Status, rules_from_tree
+from fuzzytree.runtimes import baseline, class_probabilities, rule_codes
+from fuzzytree.semantics import Status, rules_of
 from fuzzytree.tables import TableSource, batches, read_table
 
 try:
@@ -56,7 +57,7 @@ except ImportError as error:
     ) from error
 
 if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray, ModelKind, Outcome, Run
+    from fuzzytree.model import FloatArray, IntArray, Model, Outcome
 
 P = ParamSpec("P")
 LabelArray = npt.NDArray[np.generic]
@@ -77,6 +78,8 @@ def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
 
 def _frame_of(X: Any) -> nw.DataFrame[Any] | None:
     """Return a frame, None for anything else, or if two columns have one name."""
+    if isinstance(X, np.ndarray | list):  # which takes long to find out
+        return None
     try:
         frame = nw.from_native(X, eager_only=True)
     except TypeError:
@@ -191,7 +194,6 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     n_features_in_: int
     feature_names_in_: npt.NDArray[np.object_]
     _learner: ArrayLearner
-    _run: Callable[[ModelKind], Run]
 
     @_with_hints
     def __init__(
@@ -387,7 +389,6 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         learnt = self._learner.finish()
         self.tree_ = with_label_type(learnt.tree, label_type_of(self.classes_.tolist()))
         self.report_ = learnt.report
-        self._run = _prepared(self.tree_)
         return self
 
     def predict(self, X: npt.ArrayLike) -> LabelArray:
@@ -397,9 +398,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             ValueError: If X does not fit the table of `fit`, or a value is so large
                 that a combination of columns overflows.
         """
-        rules, tree = self._rules(X), self.tree_
-        codes = [tree.classes.index(leaf.label) for leaf in tree.leaves]
-        return self.classes_[np.array(codes, np.int64)[rules - 1]]
+        return self.classes_[rule_codes(self.tree_)[self._rules(X)]]
 
     def apply(self, X: npt.ArrayLike) -> IntArray:
         """Return the number of the leaf of each row, as scikit-learn's trees do.
@@ -416,7 +415,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return numbers
 
     def _rules(self, X: npt.ArrayLike) -> IntArray:
-        return self._answers(self._values(X), "tree").rule
+        return self._answers(self._values(X), self.tree_).rule
 
     def predict_proba(self, X: npt.ArrayLike) -> FloatArray:
         """Return the probability of each class, as the tree's leaves have it.
@@ -437,8 +436,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 f"a tree of {len(self.tree_.leaves)} leaves and {len(self.classes_)} "
                 "classes has no probabilities: there are too many for a model"
             )
-        outcome = self._answers(values, "rules")
-        rules = rules_from_tree(self.tree_)
+        rules = rules_of(self.tree_)
+        outcome = self._answers(values, rules)
         strengths = outcome.strengths
         assert strengths is not None  # the native runtime returns them for a rule base
         mixed = class_probabilities(rules, strengths, outcome.rule)
@@ -553,16 +552,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return self.tree_
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out training rows, and what is prepared from the tree."""
+        """Leave out training rows."""
         state: Any = super().__getstate__()
-        left_out = ("_learner", "_run")
-        return {name: value for name, value in state.items() if name not in left_out}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Prepare the tree again."""
-        super().__setstate__(state)
-        if "tree_" in state:
-            self._run = _prepared(self.tree_)
+        return {name: value for name, value in state.items() if name != "_learner"}
 
     def _columns(self) -> list[str]:
         names = getattr(self, "feature_names_in_", None)
@@ -577,21 +569,27 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _values(self, X: npt.ArrayLike) -> FloatArray:
         """Return the columns that the tree needs, shape (inputs, rows)."""
         check_is_fitted(self)
-        frame = _frame_of(X)
+        frame, tree = _frame_of(X), self.tree_
+        variables = [one for one in tree.variables if not one.parts]
         if frame is None:
             rows: Any = _validated(self, X, reset=False, **self._numeric())
+            place = {name.strip(): k for k, name in enumerate(self._columns())}
+            places = [place.get(one.name.strip()) for one in variables]
+            if not (None in places or any(one.categories for one in variables)):
+                return np.ascontiguousarray(rows.T[places])
         else:
             _validated(self, X, reset=False, skip_check_array=True)
             rows = self._with_own_names(frame).to_native()
-        table, variables = TableSource(rows, self._columns()), self.tree_.variables
-        [part] = batches(table, self.tree_.inputs, variables=variables, name="X")
+        table = TableSource(rows, self._columns())
+        [part] = batches(table, tree.inputs, variables=variables, name="X")
         if frame is not None:
             title: dict[str, Any] = {"input_name": "X", "ensure_min_features": 0}
             check_array(part.values.T, **title, **self._numeric())
         return part.values
 
-    def _answers(self, values: FloatArray, representation: ModelKind) -> Outcome:
-        outcome = self._run(representation)(values)
+    def _answers(self, values: FloatArray, model: Model) -> Outcome:
+        run = remember(model, "native", lambda: baseline().load(model))
+        outcome = run(values)
         overflown = np.flatnonzero(outcome.status == Status.MISSING)
         if len(overflown):
             raise ValueError(
@@ -599,17 +597,3 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 f"of columns overflows ({len(overflown)} such rows)"
             )
         return outcome
-
-
-def _prepared(tree: FuzzyTree) -> Callable[[ModelKind], Run]:
-    """Return a function that gives the native runtime's run of the tree or its rules.
-
-    Each is prepared at its first use.
-    """
-
-    @functools.cache
-    def run(representation: ModelKind) -> Run:
-        model = tree if representation == "tree" else rules_from_tree(tree)
-        return baseline().load(model)
-
-    return run

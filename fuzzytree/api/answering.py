@@ -23,9 +23,11 @@ from fuzzytree.model import (
     FuzzySystem,
     Model,
     ModelSource,
+    Run,
     Runtime,
     Variable,
     kind_of,
+    remember,
 )
 from fuzzytree.runtimes import (
     OnnxModel,
@@ -215,9 +217,10 @@ def prepare_answering(
     with_strengths: bool = True,
     with_probabilities: bool = False,
 ) -> Answering:
-    """Make a model ready to answer.
+    """Make a model ready to answer, unless it is.
 
-    With probabilities a tree is run as its relative rules.
+    What one model needs is kept as long as the model, where threads may share it. With
+    probabilities a tree is run as its relative rules.
 
     Raises:
         MissingExtraError: If the runtime is not installed.
@@ -233,7 +236,12 @@ def prepare_answering(
     if is_short and runtime is None and kind_of(model) in find_runtime(_SHORT).runs:
         runtime = _SHORT
     used = _runtime(runtime or baseline().name, model)
-    execute = used.load(model, with_strengths=with_strengths or with_probabilities)
+
+    def load() -> Run:
+        return used.load(model, with_strengths=with_strengths or with_probabilities)
+
+    key = used.name, with_strengths or with_probabilities
+    execute = remember(model, key, load) if used.is_reentrant else load()
 
     def answer(values: FloatArray) -> Predictions | Outputs:
         outcome = execute(np.ascontiguousarray(values))
@@ -244,9 +252,8 @@ def prepare_answering(
             with_probabilities=with_probabilities,
         )
 
-    return Answering(
-        model.inputs, model.columns, answer, used.is_reentrant, model.variables
-    )
+    variables = tuple(one for one in model.variables if not one.parts)
+    return Answering(model.inputs, model.columns, answer, used.is_reentrant, variables)
 
 
 def _rated(model: Document | OnnxModel) -> Document | OnnxModel:

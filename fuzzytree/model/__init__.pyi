@@ -175,6 +175,7 @@ from .tree import root_of as root_of
 from .tree import with_label_type as with_label_type
 from .values import Result as Result
 from .values import Value as Value
+from .values import remember as remember
 from .values import summary as summary
 from .variables import DATE_UNIT as DATE_UNIT
 from .variables import Part as Part

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from collections.abc import Callable, Hashable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar
 
 import msgspec
 
 if TYPE_CHECKING:
     from fuzzytree.model.variables import Variable
 
+T = TypeVar("T")
 ModelKind = Literal["tree", "rules", "system"]
 
 
@@ -61,10 +64,36 @@ class _WithVariables(Protocol):
     def variables(self) -> tuple[Variable, ...]: ...
 
 
-class AnyModel(Result, Value, frozen=True):
-    """What a model of any kind has."""
+class AnyModel(Result, Value, frozen=True, dict=True):
+    """What a model of any kind has.
 
-    @property
+    Beside its fields it has room for what was made of it (`remember`), which no
+    comparison, copy or file sees.
+    """
+
+    @functools.cached_property
     def inputs(self: _WithVariables) -> tuple[str, ...]:
         """The names of the columns that the model needs, in order."""
         return tuple(v.name for v in self.variables if not v.parts)
+
+
+def remember(model: object, key: Hashable, make: Callable[[], T]) -> T:
+    """Return what was made of a model, which lives as long as the model does.
+
+    Args:
+        model: A tree, a rule base or a fuzzy system.
+        key: What is made, and with which options.
+        make: Makes it, at the first call with this key.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(0)
+        >>> text = remember(tree, "outline", lambda: str(tree))
+        >>> remember(tree, "outline", str) is text
+        True
+    """
+    made: dict[Hashable, Any] = vars(model).setdefault("_made", {})
+    if key not in made:
+        made[key] = make()
+    result: T = made[key]
+    return result

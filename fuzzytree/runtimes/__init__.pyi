@@ -3,6 +3,7 @@ from .c import compiled as compiled
 from .machines import MachineSize as MachineSize
 from .machines import machine_sizes as machine_sizes
 from .mixing import class_probabilities as class_probabilities
+from .mixing import rule_codes as rule_codes
 from .native_rules import fire as fire
 from .one_row import load as load
 from .one_row import row_runner as row_runner

@@ -22,9 +22,12 @@ from fuzzytree.model import Dtype, FloatArray, FuzzyTree, IntArray, Outcome, Run
 from fuzzytree.runtimes.degrees import NUMBERS
 from fuzzytree.runtimes.rows import (
     Axes,
+    Chains,
     axis_lines,
     axis_row,
+    chain_value,
     checked,
+    input_row,
     missing_rows,
     plan_axes,
 )
@@ -385,8 +388,12 @@ def _walk_on(
             spare = 3 - spare
 
 
-def descend_row(splits: Sequence[AxisSplit], row: Sequence[float]) -> int:
+def descend_row(
+    splits: Sequence[AxisSplit], row: Sequence[float], chains: Chains = ()
+) -> int:
     """Return the number of the leaf of one row of finite values, in plain Python.
+
+    Combinations that are not in the row are computed when a node tests them.
 
     Example:
         >>> descend_row([AxisSplit(0, (1.0, 2.0), (-1, -2, -1))], [1.5])
@@ -395,7 +402,9 @@ def descend_row(splits: Sequence[AxisSplit], row: Sequence[float]) -> int:
     number = 0 if splits else -1
     while number >= 0:
         split = splits[number]
-        number = split.targets[bisect_left(split.cuts, row[split.line])]
+        place = split.line - len(row)
+        value = row[place] if place < 0 else chain_value(chains[place], row)
+        number = split.targets[bisect_left(split.cuts, value)]
     return -number
 
 
@@ -426,8 +435,7 @@ def descend_by(axes: Axes, descent: Descent, inputs: tuple[str, ...]) -> Run:
         array = checked(values, inputs)
         count = array.shape[1]
         if count == 1 and axes.dtype == np.float64:
-            row = axis_row(axes, array[:, 0].tolist())
-            return _one(descent.splits, row)
+            return _one(axes, descent.splits, array[:, 0].tolist())
         rule = np.empty(count, np.int64)
         status = np.zeros(count, np.int64)
         desk = Desk(min(count, CHUNK), axes.dtype)
@@ -449,9 +457,12 @@ def descend_by(axes: Axes, descent: Descent, inputs: tuple[str, ...]) -> Run:
     return run
 
 
-def _one(splits: tuple[AxisSplit, ...], row: list[float]) -> Outcome:
-    if math.isfinite(sum(row)) or all(map(math.isfinite, row)):
-        return Outcome(np.array([descend_row(splits, row)]), np.array([0]))
+def _one(axes: Axes, splits: tuple[AxisSplit, ...], row: list[float]) -> Outcome:
+    values = input_row(axes, row)
+    is_small = all(abs(value) <= axes.limit for value in values)  # NaN is not
+    if is_small or all(map(math.isfinite, axis_row(axes, row))):
+        leaf = descend_row(splits, values, axes.chains)
+        return Outcome(np.array([leaf]), np.array([0]))
     return Outcome(np.array([0]), np.array([3]))
 
 

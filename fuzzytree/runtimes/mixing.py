@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.model import WEIGHT_OF_ONE, Model, parts_of, squarings
+from fuzzytree.model import WEIGHT_OF_ONE, Model, parts_of, remember, squarings
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray, IntArray
@@ -36,19 +36,27 @@ def class_probabilities(
     if rules.semantics.sharpness is msgspec.UNSET:
         return None
     parts = np.array([parts_of(r.probabilities) for r in rules.rules], np.float64).T
-    codes = {name: code for code, name in enumerate(rules.classes)}
-    owners = np.array([0, *(codes[label] for label in rules.rule_labels)], np.int64)
     result = np.full((len(rules.classes), strengths.shape[1]), np.nan)
     for start in range(0, len(winner), _CHUNK):
         rows = start + np.flatnonzero(winner[start : start + _CHUNK])
         weights = weights_of(strengths[:, rows], rules.semantics.sharpness)
         counts = parts @ weights
-        place = owners[winner[rows]], np.arange(len(rows))
+        place = rule_codes(rules)[winner[rows]], np.arange(len(rows))
         mine = counts[place]
         counts[place] = -1.0
         counts[place] = np.maximum(mine, counts.max(axis=0, initial=0.0) + 1.0)
         result[:, rows] = counts / counts.sum(axis=0)
     return result
+
+
+def rule_codes(model: Model) -> IntArray:
+    """Return the position of each rule's class among the classes; -1 for rule 0."""
+
+    def codes() -> IntArray:
+        position = {name: code for code, name in enumerate(model.classes)}
+        return np.array([-1, *map(position.__getitem__, model.rule_labels)], np.int64)
+
+    return remember(model, "rule codes", codes)
 
 
 def weights_of(strengths: FloatArray, sharpness: int) -> FloatArray:

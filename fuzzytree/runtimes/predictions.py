@@ -33,10 +33,11 @@ from fuzzytree.model import (
     label_of,
     name_choice,
     proposition_text,
+    remember,
     shapes_of,
     summary,
 )
-from fuzzytree.runtimes.mixing import class_probabilities
+from fuzzytree.runtimes.mixing import class_probabilities, rule_codes
 from fuzzytree.semantics import Status, axis_values, evaluate, proposition_degree
 from fuzzytree.tables import pandas_frame
 
@@ -381,14 +382,14 @@ def predictions_of(
     Probabilities need the strengths of a rule base that has them.
     """
     semantics = model.semantics
-    position = {name: k for k, name in enumerate(model.classes)}
-    owners = tuple(map(position.__getitem__, model.rule_labels))
-    codes = np.array([-1, *owners], np.int64)[outcome.rule]
+    owners = remember(model, "owners", lambda: tuple(rule_codes(model)[1:].tolist()))
+    codes = rule_codes(model)[outcome.rule]
     for status, answer in (
         (Status.UNCOVERED, semantics.uncovered),
         (Status.MISSING, semantics.missing),
     ):
-        codes[outcome.status == status] = -1 if answer is None else position[answer]
+        code = -1 if answer is None else model.classes.index(answer)
+        codes[outcome.status == status] = code
     probabilities = outcome.probabilities
     if with_probabilities and model.rules and probabilities is None:
         assert outcome.strengths is not None  # `prepare_answering` requests them

@@ -31,6 +31,13 @@ if TYPE_CHECKING:
     Real = np.dtype[np.floating[Any]]
 
 
+Chain = tuple[tuple[int, float, float], ...]
+Chains = tuple[Chain, ...]
+"""Of each combination: line, weight and centre of each part."""
+
+_SAFE = 1e300  # what sums of a row may reach: far from overflow
+
+
 def checked(values: npt.ArrayLike, inputs: Sequence[str]) -> FloatArray:
     """Return values as doubles of shape (inputs, rows), copied only if need be.
 
@@ -141,6 +148,7 @@ class Axes:
         chains: The combinations again, for a single row: (line, weight, centre) of
             each part.
         dtype: In what the chain is computed.
+        limit: If no input is larger, all variables are finite.
         stand_ins: What replaces a value that is not finite, for each input, of shape
             (inputs, 1); NaN where nothing does. None if no input has one.
     """
@@ -148,8 +156,9 @@ class Axes:
     line: dict[str, int]
     inputs: int
     steps: tuple[PartsAt, ...]
-    chains: tuple[tuple[tuple[int, float, float], ...], ...]
+    chains: Chains
     dtype: Real
+    limit: float
     stand_ins: Reals | None = None
 
     @property
@@ -183,7 +192,15 @@ def plan_axes(
     )
     known = stand_ins(variables)
     stand = np.array([[known.get(name, np.nan)] for name in inputs], kind)
-    return Axes(line, len(inputs), tuple(steps), chains, kind, stand if known else None)
+    limit = min(map(_chain_limit, chains), default=float(np.finfo(kind).max))
+    stand_or_none = stand if known else None
+    return Axes(line, len(inputs), tuple(steps), chains, kind, limit, stand_or_none)
+
+
+def _chain_limit(chain: Chain) -> float:
+    """Return a number such that inputs up to it make no double overflow."""
+    weight = sum(abs(weight) for _, weight, _ in chain)
+    return _SAFE / max(weight, 1.0) - max(abs(centre) for _, _, centre in chain)
 
 
 def axis_lines(axes: Axes, values: FloatArray) -> Reals:
@@ -214,17 +231,27 @@ def axis_lines(axes: Axes, values: FloatArray) -> Reals:
 
 def axis_row(axes: Axes, row: list[float]) -> list[float]:
     """Return the value of every variable for a single row, in double."""
+    values = input_row(axes, row)
+    return [*values, *(chain_value(chain, values) for chain in axes.chains)]
+
+
+def input_row(axes: Axes, row: list[float]) -> list[float]:
+    """Return a single row with what stands for its missing values."""
     values = row.copy()
     if axes.stand_ins is not None and not math.isfinite(sum(row)):
         for line, stand in enumerate(axes.stand_ins[:, 0].tolist()):
             if not (math.isfinite(row[line]) or math.isnan(stand)):
                 values[line] = stand
-    for (line, weight, centre), *others in axes.chains:
-        total = weight * (values[line] - centre)
-        for line, weight, centre in others:
-            total = total + weight * (values[line] - centre)
-        values.append(total)
     return values
+
+
+def chain_value(chain: Chain, values: Sequence[float]) -> float:
+    """Return a combination of the inputs of a single row, in double."""
+    line, weight, centre = chain[0]
+    total = weight * (values[line] - centre)
+    for line, weight, centre in chain[1:]:
+        total = total + weight * (values[line] - centre)
+    return total
 
 
 def missing_rows(lines: Reals) -> npt.NDArray[np.bool_] | None:

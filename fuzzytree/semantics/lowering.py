@@ -31,6 +31,7 @@ from fuzzytree.model import (
     Use,
     Variable,
     kind_of,
+    remember,
     root_of,
 )
 
@@ -101,7 +102,9 @@ def rules_of(model: Document) -> RuleBase | FuzzySystem:
         >>> rules_of(rules) is rules
         True
     """
-    return rules_from_tree(model) if isinstance(model, FuzzyTree) else model
+    if isinstance(model, FuzzyTree):
+        return remember(model, "relative rules", lambda: rules_from_tree(model))
+    return model
 
 
 def rules_from_tree(

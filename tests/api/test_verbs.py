@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import copy
+import gc
 import os
+import pickle
+import threading
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,9 +26,12 @@ import fuzzytree as ft
 from fuzzytree.api import answering
 from fuzzytree.errors import LossError, ReadError, TableError
 from fuzzytree.exporters.table import TABLE
+from fuzzytree.model.contracts import Run, Runtime
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model.values import remember
 from fuzzytree.runtimes.onnxruntime import open_onnx
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.tables import FloatArray
 from fuzzytree.testing import random_system, random_tree
 
@@ -385,3 +393,34 @@ def test_a_text_is_one_name_in_every_argument_that_takes_names() -> None:
     assert ft.check(tree, runtimes="native", settings=ft.CheckSettings(limit=100)).ok
     assert ft.stability(tree, runtimes="native", select="N3").ok
     assert ft.audit(tree, selection=ft.AuditSelection(select="FT501")).is_complete
+
+
+def test_a_model_is_made_ready_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    loads: list[object] = []
+    native = find_runtime("native")
+
+    def load(model: object, *, with_strengths: bool = True) -> Run:
+        loads.append(model)
+        return native.load(model, with_strengths=with_strengths)
+
+    def choose(name: str, model: object) -> Runtime:
+        return msgspec.structs.replace(native, load=load)
+
+    monkeypatch.setattr(answering, "_runtime", choose)
+    tree = random_tree(5, inputs=3)
+    first = [ft.run(tree, ROWS).names for _ in range(3)]
+    assert loads == [tree]
+    copies = pickle.loads(pickle.dumps(tree)), copy.copy(tree), copy.deepcopy(tree)
+    for other in copies:
+        assert other == tree
+        assert ft.run(other, ROWS).names == first[0] == first[2]
+    assert len(loads) == 4
+
+
+def test_what_is_made_of_a_model_goes_with_it() -> None:
+    tree = random_tree(6, inputs=3)
+    ft.run(tree, ROWS, with_probabilities=bool(tree.semantics.sharpness))
+    gone = weakref.ref(remember(tree, "token", threading.Event))
+    del tree
+    gc.collect()
+    assert gone() is None

@@ -124,6 +124,20 @@ def test_rows_beyond_a_chunk_are_answered_alike() -> None:
         assert result.status.tolist() == expected.status.tolist() * 60
 
 
+@pytest.mark.parametrize("size", [1.0, 1e150, 1e299, 1e300, 1e308, 1.7e308])
+def test_a_single_row_has_the_bits_of_many_up_to_overflow(size: float) -> None:
+    for seed in range(6):
+        tree = random_tree(seed, leaves=20, inputs=4, combinations=0.8)
+        values = np.random.default_rng(seed).normal(size=(len(tree.inputs), 300))
+        values = np.clip(values, -1.0, 1.0) * size
+        values[0, :20] = [math.nan, math.inf, -math.inf, 5e-324, -0.0] * 4
+        run = load(tree)
+        many = run(values)
+        singles = [run(values[:, k : k + 1]) for k in range(300)]
+        assert many.rule.tolist() == [one.rule[0] for one in singles]
+        assert many.status.tolist() == [one.status[0] for one in singles]
+
+
 def test_an_overflowing_combination_is_missing() -> None:
     mix = Variable(
         "mix",
