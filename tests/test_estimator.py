@@ -177,7 +177,7 @@ def test_the_report_says_of_which_classes_rows_were_left_out() -> None:
     values = np.random.default_rng(0).normal(size=(150, 2)) + labels[:, None]
     model = FuzzyTreeClassifier(rows_per_class=30).fit(values, labels)
     assert model.report_.sampled == {"1": (30, 70), "2": (30, 60)}
-    text = "learned from 30 of 70 rows of class '1', 30 of 60 rows of class '2'"
+    text = "learnt from 30 of 70 rows of class '1', 30 of 60 rows of class '2'"
     assert text in str(model.report_)
     assert not FuzzyTreeClassifier().fit(values, labels).report_.sampled
     many = FuzzyTreeClassifier(rows_per_class=2, mode="paper")

@@ -5,6 +5,7 @@ from .decisions import why as why
 from .holdout import Accuracy as Accuracy
 from .holdout import Summary as Summary
 from .holdout import accuracy as accuracy
+from .holdout import accuracy_of as accuracy_of
 from .holdout import front as front
 from .holdout import grouped as grouped
 from .holdout import majority as majority

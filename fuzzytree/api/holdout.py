@@ -19,6 +19,7 @@ from fuzzytree.learning import (
     Front,
     LearningReport,
     LearningSettings,
+    Learnt,
     class_weights,
     learn_arrays,
 )
@@ -47,23 +48,30 @@ MOST_WEAK = 0.05
 
 _FEWEST = 2 * FOLDS  # rows
 
+_UNSEEN, _TESTED = 1_000, 200_000
+"""The fewest rows of each class to test a tree itself on, and the most of all."""
+
 
 class Accuracy(msgspec.Struct, frozen=True):
     """The share of rows that were predicted right, for each fold.
 
     Attributes:
         folds: The share in each fold that was tried, by the weights of rows and
-            classes. A row that gets no class counts as wrong.
+            classes. A row that gets no class counts as wrong. One for a tree that was
+            tested itself.
         rows: How many rows the folds are made of.
         of: How many rows the table has.
         weak: The share of the rows of groups that were left out for which the raw rule
             that decides is weaker than `USUAL_FLOOR`; None without groups or sets.
+        is_of_tree: Whether the tree itself was tested, on rows that it was not learnt
+            from, and no folds were made.
     """
 
     folds: tuple[float, ...]
     rows: int
     of: int
     weak: float | None = None
+    is_of_tree: bool = False
 
     @property
     def mean(self) -> float:
@@ -94,8 +102,9 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
         accuracy: The cross-validated accuracy, by the weights of rows and classes, the
             mean over the folds; null without a test.
         majority: The accuracy, by the same weights, of always predicting one class.
-        folds: The accuracy of each fold; null without a test.
-        rows_tested: How many rows the folds are made of; null without a test.
+        folds: The accuracy of each fold; null without folds.
+        rows_tested: How many rows the folds are made of, or without folds, on how many
+            that it was not learnt from the tree was tested; null without a test.
         seed: Of the folds.
         report: What learning counted and repaired.
         front: How accurate small trees are; null without a test.
@@ -200,20 +209,55 @@ def accuracy(
             categories=table.categories,
             weights=None if table.row_weights is None else table.row_weights[kept],
         )
-        tree = learnt.tree
-        places = np.array([table.columns.index(k) for k in tree.inputs], np.int64)
-        values = table.values[np.ix_(places, test)]
-        rules = baseline().load(tree)(values).rule
-        if groups is not None and tree.sets:
-            weak.append(_is_weak(tree, values, rules))
-        ends = [-1, *(table.classes.index(leaf.label) for leaf in tree.leaves)]
-        right = np.array(ends)[rules] == table.codes[test]
+        values, rules, right = _predicted(table, learnt.tree, test)
+        if groups is not None and learnt.tree.sets:
+            weak.append(_is_weak(learnt.tree, values, rules))
         weight = None if weights is None else weights[test]
         shares.append(float(np.average(right, weights=weight)))
     if not shares:
         return None
     share = float(np.concatenate(weak).mean()) if weak else None
     return Accuracy(tuple(shares), len(rows), table.rows, share)
+
+
+def accuracy_of(
+    table: Table, learnt: Learnt, settings: LearningSettings
+) -> Accuracy | None:
+    """Count how often a tree is right about rows that it was not learnt from.
+
+    Args:
+        table: The table that it was learnt from.
+        learnt: The tree.
+        settings: How it was learnt.
+
+    Returns:
+        The accuracy, where classes weigh as in the table; None if a class has fewer
+        than 1,000 such rows.
+    """
+    if learnt.unseen is None:
+        return None
+    rows = np.flatnonzero(learnt.unseen)
+    counts = np.bincount(table.codes[rows], minlength=len(table.classes))
+    if counts.min() < _UNSEEN:
+        return None
+    rows = rows[sampled(table.codes[rows], _TESTED, settings.seed)]
+    counts = np.bincount(table.codes[rows], minlength=len(table.classes))
+    whole = np.bincount(table.codes, _weights(table, settings))
+    heavy = whole / np.maximum(counts, 1)
+    right = _predicted(table, learnt.tree, rows)[2]
+    share = float(np.average(right, weights=heavy[table.codes[rows]]))
+    return Accuracy((share,), len(rows), table.rows, is_of_tree=True)
+
+
+def _predicted(
+    table: Table, tree: FuzzyTree, rows: IntArray
+) -> tuple[FloatArray, IntArray, BoolArray]:
+    """Return the inputs of rows, their rules, and which have the class of the row."""
+    places = np.array([table.columns.index(k) for k in tree.inputs], np.int64)
+    values = table.values[np.ix_(places, rows)]
+    rules = baseline().load(tree)(values).rule
+    ends = [-1, *(table.classes.index(leaf.label) for leaf in tree.leaves)]
+    return values, rules, np.array(ends)[rules] == table.codes[rows]
 
 
 def grouped(table: Table, column: str) -> tuple[Table, IntArray]:

@@ -200,8 +200,10 @@ def command(options: LearnOptions) -> None:
     of any length are read in bounded memory. The accuracy is
     cross-validated: it is that of trees learnt without the rows that they are tested
     on, and each fold chooses anew how to split and to prune; the folds are made of
-    20,000 rows at most. For states, and for tables above 33 million cells, accuracy
-    and supports of leaves are estimated from the rows that are kept.
+    20,000 rows at most. Where the table has 1,000 rows or more of each class that
+    the tree was not learnt from, it is that of the tree on these rows. For states,
+    and for tables above 33 million cells, accuracy and supports of leaves are
+    estimated from the rows that are kept.
     """
     form = wanted_format(options.output, None)
     if options.output != "-":
@@ -220,7 +222,14 @@ def _learnt(
     options: LearnOptions, *, is_state: bool
 ) -> tuple[FuzzyTree, Lines, object]:
     """Return a tree of all rows, what to say about it, and the facts."""
-    from fuzzytree.api import accuracy, front, grouped, learn_table, majority
+    from fuzzytree.api import (
+        accuracy,
+        accuracy_of,
+        front,
+        grouped,
+        learn_table,
+        majority,
+    )
     from fuzzytree.learning import remarks
     from fuzzytree.report import counted
     from fuzzytree.tables import Table
@@ -262,7 +271,9 @@ def _learnt(
     if not options.no_test:
         begin = time.perf_counter()
         with progress_bar(quiet=is_silent) as show:
-            tested = accuracy(
+            if groups is None:
+                tested = accuracy_of(found, learnt, settings)
+            tested = tested or accuracy(
                 found, settings, seed=settings.seed, groups=groups, progress=show
             )
         said = _timed(_accuracy_text(tested, found, settings), begin)
@@ -573,7 +584,7 @@ def _summary(
         leaves=len(learnt.tree.leaves),
         accuracy=tested.mean if tested else None,
         majority=majority(table, settings),
-        folds=tested.folds if tested else None,
+        folds=tested.folds if tested and not tested.is_of_tree else None,
         rows_tested=tested.rows if tested else None,
         seed=settings.seed,
         report=learnt.report,
@@ -606,6 +617,8 @@ def _accuracy_text(
         baseline = f"by the weights of classes; {baseline}"
     if tested is None:
         return f"too few rows for cross-validation ({baseline})"
+    if tested.is_of_tree:
+        return f"on {tested.rows:,} rows that it was not learnt from ({baseline})"
     folds = counted(len(tested.folds), "fold")
     kept = f"the {len(table.codes):,} rows that were kept of "
     part = f" on {tested.rows:,} of {kept if table.weights is not None else ''}"
@@ -634,7 +647,7 @@ def _report_rows(
         rows.append(("filled", text, why))
     if report.sampled:
         text = counted(report.rows_sampled, "row")
-        rows.append(("sampled", text, f"learned from {report.sampling}"))
+        rows.append(("sampled", text, f"learnt from {report.sampling}"))
         text = "from the rows that were kept; `collect --for` counts all rows"
         rows.append(("estimated", "supports of leaves", text))
     if report.features_ignored:

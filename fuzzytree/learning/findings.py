@@ -106,7 +106,7 @@ class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
         nodes = ", ".join(map(str, self.features_per_node)) or "none"
         lines.append(f"{self.leaves} leaves; features per node: {nodes}")
         if self.sampled:
-            lines.append(f"learned from {self.sampling}")
+            lines.append(f"learnt from {self.sampling}")
         if self.features_ignored:
             lines.append(f"columns ignored: {', '.join(self.features_ignored)}")
         lines += [_counted(self, name, text) for name, text in _TABLE.items()]

@@ -32,7 +32,7 @@ from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
-from fuzzytree.learning.units import FloatArray, IntArray, tallied
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
 from fuzzytree.learning.weights import (
     MOST_COPIES,
     RowWeights,
@@ -50,10 +50,18 @@ _INCOMPLETE = (
 
 
 class Learnt(msgspec.Struct, frozen=True):
-    """What learning gives: the tree, and what was counted on the way."""
+    """What learning gives: the tree, and what was counted on the way.
+
+    Attributes:
+        tree: The tree.
+        report: What was counted.
+        unseen: Which rows of a table the tree was not grown from; None if it was grown
+            from all rows, or in paper mode, or if they came in parts.
+    """
 
     tree: FuzzyTree
     report: LearningReport
+    unseen: BoolArray | None = None
 
 
 def learn_arrays(
@@ -105,7 +113,17 @@ def learn_arrays(
         categories=categories or {},
     )
     learner.partial_fit(values, labels, weights=weights, progress=progress)
-    return learner.finish(progress=progress)
+    learnt = learner.finish(progress=progress)
+    if (
+        not learnt.report.sampled
+        or weights is not None
+        or learner.settings.mode == "paper"
+    ):
+        return learnt
+    coded, codes = learner.coded(values, labels)
+    return msgspec.structs.replace(
+        learnt, unseen=learner.statistics.leaves_out(coded, codes)
+    )
 
 
 @dataclass
@@ -163,15 +181,9 @@ class ArrayLearner:
                 no whole numbers come in chunks or in paper mode.
             LearningError: If `missing` is `refuse` and a value is missing.
         """
-        codes = _codes(labels, self.classes)
-        values = numbers_only(values, "the array")
-        _check_shape(values, codes, len(self.columns))
+        values, codes = self.coded(values, labels)
         if progress is not None:
             progress("counting", 0.0)
-        if self.categories:
-            values = codes_of_positions(
-                values.astype(np.float64), self.columns, self.categories
-            )
         found = None
         if weights is not None:
             found = row_weights(checked_weights(weights, len(values)))
@@ -193,6 +205,25 @@ class ArrayLearner:
             )
         if progress is not None:
             progress("counting", 1.0)
+
+    def coded(
+        self,
+        values: npt.NDArray[np.generic],
+        labels: Sequence[str] | npt.NDArray[np.generic],
+    ) -> tuple[npt.NDArray[np.generic], IntArray]:
+        """Return rows and classes as numbers that do not depend on the other rows.
+
+        Raises:
+            ValueError: If shapes and labels do not fit.
+        """
+        codes = _codes(labels, self.classes)
+        values = numbers_only(values, "the array")
+        _check_shape(values, codes, len(self.columns))
+        if self.categories:
+            values = codes_of_positions(
+                values.astype(np.float64), self.columns, self.categories
+            )
+        return values, codes
 
     def _refuse_shares(self, weights: RowWeights | None) -> None:
         """Make room for weights that are no whole numbers, a column behind the others.

@@ -23,7 +23,13 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.learning.sums import padded, runs, sized
-from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray, units_of
+from fuzzytree.learning.units import (
+    BoolArray,
+    ColumnUnits,
+    FloatArray,
+    IntArray,
+    units_of,
+)
 
 Hashes = npt.NDArray[np.uint64]
 
@@ -155,6 +161,12 @@ class DistinctRows:
         self._kept += len(chosen)
         if self._kept > self._settled + self._settled // 2 + _BUFFER:
             self.settle()
+
+    def leaves_out(self, values: FloatArray, codes: IntArray) -> BoolArray:
+        """Return which rows are none of those kept, as `offer` takes them."""
+        self.settle()
+        is_out: BoolArray = hashed_digits(values) > self._limits[codes]
+        return is_out
 
     def take(self, other: DistinctRows, positions: IntArray) -> None:
         """Add the rows of another table; two classes may become one.

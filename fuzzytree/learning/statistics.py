@@ -124,16 +124,8 @@ class Statistics:
         self.unlabelled += len(piece) - count
         place = slice(self._filled, self._filled + count)
         everything = count == len(piece)
-        # Adding zero makes a negative zero a positive one: they are equal numbers.
-        block = self._block[place]
-        np.add(piece if everything else piece[usable], 0.0, out=block)
-        is_complete = finite_rows(block)
-        if not is_complete.all():
-            block[:] = piece[usable]  # no sum, which may change the codes of texts
-            block[block == 0.0] = 0.0
-            is_missing = is_missing_code(block)
-            block[is_missing] = np.nan
-            self.dropped += int(np.count_nonzero(is_missing.any(axis=1)))
+        chosen = piece if everything else piece[usable]
+        self.dropped += _copy_rows(chosen, self._block[place])
         self._block_codes[place] = codes if everything else codes[usable]
         self._filled += count
 
@@ -300,6 +292,18 @@ class Statistics:
             self.rows_per_class or min(usual, self._rows.most),
         )
 
+    def leaves_out(self, values: npt.NDArray[np.generic], codes: IntArray) -> BoolArray:
+        """Return which rows of the table, as `update` took them, are not kept."""
+        self._absorb()
+        size = len(self._block)
+        is_out: BoolArray = codes >= 0
+        for first in range(0, len(values), size):
+            piece = np.asarray(values[first : first + size], np.float64)
+            own = slice(first, first + len(piece))
+            _copy_rows(piece, self._block[: len(piece)])
+            is_out[own] &= self._rows.leaves_out(self._block[: len(piece)], codes[own])
+        return is_out
+
     def of_columns(self, kept: Sequence[int]) -> Statistics:
         """Return the statistics of some of the columns."""
         if len(kept) == self.features:
@@ -324,6 +328,19 @@ class Statistics:
         found._counts = found._complete.copy()
         found._rows.keep_complete()
         return found
+
+
+def _copy_rows(values: FloatArray, block: FloatArray) -> int:
+    """Copy rows, equal numbers with equal bits; return how many miss a value."""
+    # Adding zero makes a negative zero a positive one: they are equal numbers.
+    np.add(values, 0.0, out=block)
+    if finite_rows(block).all():
+        return 0
+    block[:] = values  # no sum, which may change the codes of texts
+    block[block == 0.0] = 0.0
+    is_missing = is_missing_code(block)
+    block[is_missing] = np.nan
+    return int(np.count_nonzero(is_missing.any(axis=1)))
 
 
 def finite_rows(values: FloatArray) -> BoolArray:

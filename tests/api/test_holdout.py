@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fuzzytree.api import holdout
+from fuzzytree.api import holdout, learn_table, run
 from fuzzytree.api.holdout import (
     Accuracy,
     accuracy,
+    accuracy_of,
     folds_of,
     grouped,
     majority,
@@ -95,6 +96,42 @@ def test_a_class_of_one_row_is_answered_wrong_and_not_an_error() -> None:
     result = _accuracy(table)
     assert result is not None
     assert result.mean < 1.0
+
+
+def test_a_tree_is_tested_on_rows_that_it_was_not_learnt_from() -> None:
+    chance = np.random.default_rng(0)
+    codes = np.repeat([0, 1], [6_000, 3_000])
+    values = chance.normal(size=(9_000, 2)) + codes[:, None]
+    settings = LearningSettings(rows_per_class=2_000, leaves=2)
+    whole = read_table(values, target=codes)
+    learnt = learn_table(whole, name="t", units={}, settings=settings)
+    result = accuracy_of(whole, learnt, settings)
+    assert result is not None
+    assert learnt.unseen is not None
+    assert (result.rows, result.of, result.is_of_tree) == (5_000, 9_000, True)
+    others = np.flatnonzero(learnt.unseen)
+    predicted = run(learnt.tree, values[others]).classes
+    is_right = np.asarray(predicted, np.int64) == codes[others]
+    shares = [is_right[codes[others] == code].mean() for code in (0, 1)]
+    assert result.mean == pytest.approx(2 / 3 * shares[0] + 1 / 3 * shares[1])
+    balanced = LearningSettings(class_weight="balanced")
+    half = accuracy_of(whole, learnt, balanced)
+    assert half is not None
+    assert half.mean == pytest.approx(sum(shares) / 2)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        LearningSettings(),  # from all rows
+        LearningSettings(rows_per_class=500, mode="paper"),  # whose means are of all
+        LearningSettings(rows_per_class=1_100),  # a class has fewer than 1,000 others
+    ],
+)
+def test_a_tree_is_not_tested_without_such_rows(settings: LearningSettings) -> None:
+    whole = _table(4_000)
+    learnt = learn_table(whole, name="t", units={}, settings=settings)
+    assert accuracy_of(whole, learnt, settings) is None
 
 
 def test_progress_is_reported_fold_by_fold() -> None:

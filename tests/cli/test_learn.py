@@ -83,7 +83,7 @@ def test_a_sample_is_reported_where_not_all_rows_are_kept(call: Call) -> None:
     err = call(*words, "--rows-per-class", "4")[2]
     # Rows that are powers of two apart are kept together or not at all.
     assert (
-        "sampled   6 rows             learned from 4 of 6 rows of class 'firm', 2 of 6 "
+        "sampled   6 rows             learnt from 4 of 6 rows of class 'firm', 2 of 6 "
         "rows of class 'soft'\n"
     ) in err
     assert "sampled" not in call(*words)[2]
@@ -99,6 +99,21 @@ def test_a_large_table_is_tested_on_a_sample(call: Call) -> None:
         "accuracy 1.000            cross-validated (majority class 0.500; 5 folds on "
         "20,000 of 21,000 rows: 1.000 to 1.000)"
     )
+
+
+def test_a_large_table_tests_the_tree_itself(call: Call) -> None:
+    values = np.random.default_rng(0).normal(size=4_200).round(6)
+    lines = [f"{a + 9.0 * (k % 2)},{k % 2}" for k, a in enumerate(values)]
+    Path("t.csv").write_text("\n".join(["a,grip", *lines, ""]), "utf-8")
+    words = ("learn", "t.csv", "--target", "grip", "-o", "t.yaml", "--rows-per-class")
+    _, out, err = call(*words, "900", "--json")
+    assert re.sub(r", [0-9.]+ s$", "", err.splitlines()[0]) == (
+        "accuracy  1.000              on 2,400 rows that it was not learnt from "
+        "(majority class 0.500)"
+    )
+    facts = json.loads(out)
+    assert (facts["accuracy"], facts["folds"], facts["rows_tested"]) == (1, None, 2400)
+    assert facts["report"]["sampled"] == {"0": [900, 2100], "1": [900, 2100]}
 
 
 def test_an_identifier_is_remarked_on_before_learning(call: Call) -> None:

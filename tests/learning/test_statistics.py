@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fuzzytree.columns import text_codes
 from fuzzytree.learning import statistics as module
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.learning.units import FloatArray, IntArray
@@ -139,6 +140,30 @@ def test_without_a_number_fewer_rows_of_many_classes_are_learned_from(
     loaded = Statistics(classes, columns)
     loaded.fill(joined.arrays())
     assert bits(loaded)[-2:] == bits(joined)[-2:] == bits(whole)[-2:]
+
+
+def test_rows_that_are_not_kept_are_named() -> None:
+    rng = np.random.default_rng(0)
+    values = rng.integers(-20, 21, (3_000, 3)) / 4.0
+    values[rng.random(values.shape) < 0.1] = -0.0
+    values[rng.random(values.shape) < 0.05] = np.nan
+    values[::7, 2] = text_codes(["a"])
+    codes = rng.integers(-1, 4, len(values))
+    statistics = Statistics(4, 3, rows_per_class=100)
+    statistics.update(values, codes)
+    is_out = statistics.leaves_out(values, codes)
+    kept = statistics.sample()
+
+    def keys(rows: FloatArray, labels: IntArray) -> set[tuple[bytes, int]]:
+        plain = np.where(rows == 0, 0.0, rows)
+        return {(k.tobytes(), c) for k, c in zip(plain, labels.tolist(), strict=True)}
+
+    assert not is_out[codes < 0].any()
+    known = keys(kept.rows, kept.codes)
+    assert not known & keys(values[is_out], codes[is_out])
+    is_in = ~is_out & (codes >= 0)
+    assert keys(values[is_in], codes[is_in]) == known
+    assert np.count_nonzero(is_out) > 1_000
 
 
 def test_the_table_is_not_changed() -> None:
