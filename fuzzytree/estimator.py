@@ -33,7 +33,7 @@ from fuzzytree.model import (
     with_label_type,
 )
 from fuzzytree.report import Picture, draw_model
-from fuzzytree.runtimes import baseline, class_probabilities, rule_codes
+from fuzzytree.runtimes import baseline, mix, rule_codes
 from fuzzytree.semantics import Status, rules_of
 from fuzzytree.tables import TableSource, batches, read_table
 
@@ -57,7 +57,7 @@ except ImportError as error:
     ) from error
 
 if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray, Model, Outcome
+    from fuzzytree.model import FloatArray, IntArray, Outcome, Run
 
 P = ParamSpec("P")
 LabelArray = npt.NDArray[np.generic]
@@ -415,7 +415,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return numbers
 
     def _rules(self, X: npt.ArrayLike) -> IntArray:
-        return self._answers(self._values(X), self.tree_).rule
+        values, tree = self._values(X), self.tree_
+        run = remember(tree, ("native", True, False), lambda: baseline().load(tree))
+        return self._answers(values, run).rule
 
     def predict_proba(self, X: npt.ArrayLike) -> FloatArray:
         """Return the probability of each class, as the tree's leaves have it.
@@ -437,10 +439,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 "classes has no probabilities: there are too many for a model"
             )
         rules = rules_of(self.tree_)
-        outcome = self._answers(values, rules)
-        strengths = outcome.strengths
-        assert strengths is not None  # the native runtime returns them for a rule base
-        mixed = class_probabilities(rules, strengths, outcome.rule)
+        run = remember(rules, "mix", lambda: mix(rules))
+        mixed = self._answers(values, run).probabilities
         assert mixed is not None  # the tree has a sharpness
         return np.ascontiguousarray(mixed.T)
 
@@ -587,8 +587,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             check_array(part.values.T, **title, **self._numeric())
         return part.values
 
-    def _answers(self, values: FloatArray, model: Model) -> Outcome:
-        run = remember(model, "native", lambda: baseline().load(model))
+    def _answers(self, values: FloatArray, run: Run) -> Outcome:
         outcome = run(values)
         overflown = np.flatnonzero(outcome.status == Status.MISSING)
         if len(overflown):

@@ -38,9 +38,11 @@ from fuzzytree.runtimes import (
     find_runtime,
     is_installed,
     joined,
+    mix,
     needed_by,
     open_onnx,
     outputs_of,
+    rules_only,
 )
 from fuzzytree.semantics import rules_of
 from fuzzytree.tables import Batch, TableSource, batches, in_order
@@ -237,10 +239,13 @@ def prepare_answering(
         runtime = _SHORT
     used = _runtime(runtime or baseline().name, model)
 
+    key = used.name, with_strengths, with_probabilities
+
     def load() -> Run:
+        if key == (baseline().name, False, True):
+            return mix(rules_only(model, used.name, "mixes"))
         return used.load(model, with_strengths=with_strengths or with_probabilities)
 
-    key = used.name, with_strengths or with_probabilities
     execute = remember(model, key, load) if used.is_reentrant else load()
 
     def answer(values: FloatArray) -> Predictions | Outputs:

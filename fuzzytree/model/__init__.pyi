@@ -122,6 +122,7 @@ from .probabilities import PARTS as PARTS
 from .probabilities import SHARPNESS as SHARPNESS
 from .probabilities import WEIGHT_OF_ONE as WEIGHT_OF_ONE
 from .probabilities import Probabilities as Probabilities
+from .probabilities import least_strength as least_strength
 from .probabilities import parts_of as parts_of
 from .probabilities import squarings as squarings
 from .rulebase import USUAL_FLOOR as USUAL_FLOOR

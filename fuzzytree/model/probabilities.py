@@ -3,12 +3,15 @@
 A row's probabilities are a mixture of the vectors of all rules. Rule r has the weight
 `floor(65536 * strength ** sharpness)`, its vector counts millionths, and class c gets
 `n[c] = sum(weight[r] * vector[r][c])`, a sum of whole numbers that is exact in double
-in any order. If the predicted class has not the largest number alone, it gets the
-largest of the others plus 1. The probability of c is `n[c] / sum(n)`, rounded once.
+in any order. A rule whose strength is below `65536 ** (-1 / sharpness)` has the weight
+0, so a runtime may leave it out. If the predicted class has not the largest number
+alone, it gets the largest of the others plus 1. The probability of c is
+`n[c] / sum(n)`, rounded once.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import msgspec
@@ -52,6 +55,18 @@ def squarings(sharpness: int | msgspec.UnsetType) -> int:
         3
     """
     return (sharpness or 1).bit_length() - 1
+
+
+def least_strength(sharpness: int) -> float:
+    """Return a strength below which a rule has the weight 0, however it is rounded.
+
+    Squares are off by less than `sharpness` roundings, which the margin is far above.
+
+    Example:
+        >>> round(least_strength(4), 6)
+        0.0625
+    """
+    return math.pow(WEIGHT_OF_ONE, -1.0 / sharpness) * (1.0 - 1e-9)
 
 
 def sharpness_mistakes(sharpness: int | msgspec.UnsetType) -> Iterator[Mistake]:

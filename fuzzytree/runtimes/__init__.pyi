@@ -3,6 +3,7 @@ from .c import compiled as compiled
 from .machines import MachineSize as MachineSize
 from .machines import machine_sizes as machine_sizes
 from .mixing import class_probabilities as class_probabilities
+from .mixing import mix as mix
 from .mixing import rule_codes as rule_codes
 from .native_rules import fire as fire
 from .one_row import load as load
@@ -36,6 +37,7 @@ from .table import definition as definition
 from .table import find_runtime as find_runtime
 from .table import is_installed as is_installed
 from .table import needed_by as needed_by
+from .table import rules_only as rules_only
 from .written import ENGINES as ENGINES
 from .written import Options as Options
 from .written import ProgramOutcome as ProgramOutcome

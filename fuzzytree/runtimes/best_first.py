@@ -110,9 +110,9 @@ def search(rules: RuleBase) -> Run:
         >>> search(rules)(np.zeros((len(rules.inputs), 2))).rule.shape
         (2,)
     """
-    forks = _forks(rules)
+    forks = forks_of(rules)
     axes = plan_axes(rules.variables)
-    splits = _splits(rules, forks, axes.line)
+    splits = splits_of(rules, forks, axes.line)
     if splits is not None:
         return descend_by(axes, plan_descent(splits, axes.dtype), rules.inputs)
     plan = plan_rules(rules)
@@ -162,7 +162,7 @@ def search(rules: RuleBase) -> Run:
     return run
 
 
-def _forks(rules: RuleBase) -> list[PrefixNode]:
+def forks_of(rules: RuleBase) -> list[PrefixNode]:
     """Return the tree of the rules' beginnings; the first fork is the empty one."""
     forks = [PrefixNode()]
     known: dict[tuple[int, Proposition], int] = {}
@@ -180,7 +180,7 @@ def _forks(rules: RuleBase) -> list[PrefixNode]:
     return forks
 
 
-def _splits(
+def splits_of(
     rules: RuleBase, forks: Sequence[PrefixNode], line: dict[str, int]
 ) -> list[AxisSplit] | None:
     """Return the forks as splits if the plateaus of each divide its axis, or None."""

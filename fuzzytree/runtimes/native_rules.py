@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model import Dtype, Outcome, Proposition, RuleBase, Run, shapes_of
+from fuzzytree.model import Dtype, Outcome, Proposition, RuleBase, Run, Shape, shapes_of
 from fuzzytree.runtimes.degrees import (
     NUMBERS,
     Atom,
@@ -174,7 +174,8 @@ def plan_rules(rules: RuleBase, dtype: Dtype = "float64") -> RulePlan:
     )
     size = len(propositions) + len(rules.rules)
     rows = min(max(_WORKING_SET // size, _SMALLEST_CHUNK), _LARGEST_CHUNK)
-    degrees = plan_degrees(rules, propositions, axes.line, numbers, rows)
+    shapes = shapes_of(rules.variables)
+    degrees = plan_degrees(shapes, propositions, axes.line, numbers, rows)
     return RulePlan(
         axes,
         degrees,
@@ -185,7 +186,7 @@ def plan_rules(rules: RuleBase, dtype: Dtype = "float64") -> RulePlan:
 
 
 def plan_degrees(
-    rules: RuleBase,
+    shapes: Mapping[tuple[str, str], Shape],
     propositions: Sequence[Proposition],
     at_line: Mapping[str, int],
     numbers: NumberTypes,
@@ -193,9 +194,13 @@ def plan_degrees(
 ) -> Degrees:
     """Return how to compute the degrees of some propositions.
 
-    `at_line` is the line of each variable's values.
+    Args:
+        shapes: Of each term, by variable and name.
+        propositions: What is computed, a line each.
+        at_line: The line of each variable's values.
+        numbers: In which types.
+        rows: How many rows go through together.
     """
-    shapes = shapes_of(rules.variables)
     keys = dict.fromkeys((c.variable, term) for c in propositions for term in c.terms)
     atoms = {key: atoms_of(at_line[key[0]], shapes[key]) for key in keys}
     wanted = dict.fromkeys(atom for key in keys for atom in atoms[key])

@@ -8,7 +8,7 @@ operations are few and wide; the longer ones stand first.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -209,10 +209,7 @@ def axis_lines(axes: Axes, values: FloatArray) -> Reals:
     `values` has shape (inputs, rows); it is returned as it is if the plan has no
     combinations and computes in doubles, and nothing is replaced.
     """
-    base: Reals = values.astype(axes.dtype, copy=False)
-    if axes.stand_ins is not None and not np.isfinite(base.sum()):
-        replaced = ~np.isfinite(base) & np.isfinite(axes.stand_ins)
-        base = np.where(replaced, axes.stand_ins, base)
+    base = input_lines(axes, values)
     if not axes.steps:
         return base
     lines = np.empty((axes.count, values.shape[1]), axes.dtype)
@@ -227,6 +224,27 @@ def axis_lines(axes: Axes, values: FloatArray) -> Reals:
         else:
             chains[: len(term)] += term
     return lines
+
+
+def input_lines(axes: Axes, values: FloatArray) -> Reals:
+    """Return the inputs of all rows with what stands for missing values."""
+    base: Reals = values.astype(axes.dtype, copy=False)
+    if axes.stand_ins is not None and not np.isfinite(base.sum()):
+        replaced = ~np.isfinite(base) & np.isfinite(axes.stand_ins)
+        base = np.where(replaced, axes.stand_ins, base)
+    return base
+
+
+def axis_values(axes: Axes, inputs: Reals, line: int, rows: IntArray) -> Reals:
+    """Return the value of one variable in some rows, given all inputs, in double."""
+    if line < axes.inputs:
+        values: Reals = inputs[line].take(rows)
+        return values
+    chain = axes.chains[line - axes.inputs]
+    values = chain_value(
+        chain, {place: inputs[place].take(rows) for place, _, _ in chain}
+    )
+    return values
 
 
 def axis_row(axes: Axes, row: list[float]) -> list[float]:
@@ -245,8 +263,8 @@ def input_row(axes: Axes, row: list[float]) -> list[float]:
     return values
 
 
-def chain_value(chain: Chain, values: Sequence[float]) -> float:
-    """Return a combination of the inputs of a single row, in double."""
+def chain_value(chain: Chain, values: Sequence[float] | Mapping[int, Reals]) -> Any:
+    """Return a combination of the inputs of a row, or of many, in double."""
     line, weight, centre = chain[0]
     total = weight * (values[line] - centre)
     for line, weight, centre in chain[1:]:
@@ -263,3 +281,17 @@ def missing_rows(lines: Reals) -> npt.NDArray[np.bool_] | None:
         return None
     missing = ~np.logical_and.reduce(np.isfinite(lines), axis=0)
     return missing if missing.any() else None
+
+
+def known_rows(axes: Axes, values: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return in which rows every variable is finite, in double.
+
+    Combinations are computed only of rows with an input beyond the limit.
+    """
+    is_small = np.abs(input_lines(axes, values)) <= axes.limit
+    is_known: npt.NDArray[np.bool_] = np.logical_and.reduce(is_small, axis=0)
+    others = np.flatnonzero(~is_known)
+    if len(others):
+        missing = missing_rows(axis_lines(axes, values.take(others, axis=1)))
+        is_known[others] = True if missing is None else ~missing
+    return is_known

@@ -14,7 +14,7 @@ import shutil
 from collections.abc import Sequence
 
 from fuzzytree.errors import LossError, install_hint
-from fuzzytree.model import Dtype, Model, RuleBase, Runtime, as_names
+from fuzzytree.model import Document, Dtype, RuleBase, Runtime, as_names
 
 TABLE = (
     "fuzzytree.runtimes.reference",
@@ -93,7 +93,7 @@ def needed_by(runtime: Runtime) -> str:
     return install_hint(runtime.extra or "")
 
 
-def rules_only(model: Model, runtime: str, verb: str) -> RuleBase:
+def rules_only(model: Document, runtime: str, verb: str) -> RuleBase:
     """Return a rule base.
 
     Raises:
