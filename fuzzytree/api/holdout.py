@@ -21,7 +21,9 @@ from fuzzytree.learning import (
     LearningSettings,
     Learnt,
     class_weights,
+    codes_of_positions,
     learn_arrays,
+    rows_beyond,
 )
 from fuzzytree.model import USUAL_FLOOR, BoolArray, FloatArray, FuzzyTree, IntArray
 from fuzzytree.runtimes import baseline
@@ -234,9 +236,10 @@ def accuracy_of(
         The accuracy, where classes weigh as in the table; None if a class has fewer
         than 1,000 such rows.
     """
-    if learnt.unseen is None:
+    if not learnt.limits or _weights(table, LearningSettings()) is not None:
         return None
-    rows = np.flatnonzero(learnt.unseen)
+    coded = codes_of_positions(table.values.T, table.columns, table.categories)
+    rows = np.flatnonzero(rows_beyond(coded, table.codes, learnt.limits))
     counts = np.bincount(table.codes[rows], minlength=len(table.classes))
     if counts.min() < _UNSEEN:
         return None

@@ -1,3 +1,4 @@
+from .filling import codes_of_positions as codes_of_positions
 from .findings import LearningReport as LearningReport
 from .findings import refuse_measurements as refuse_measurements
 from .findings import remarks as remarks
@@ -20,4 +21,5 @@ from .settings import LearningSettings as LearningSettings
 from .settings import SettingArguments as SettingArguments
 from .settings import refuse_unknown as refuse_unknown
 from .settings import settings_of as settings_of
+from .statistics import rows_beyond as rows_beyond
 from .weights import class_weights as class_weights

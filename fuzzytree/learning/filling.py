@@ -21,6 +21,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.columns import is_missing_code, positions, text_codes
+from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.model import Band, FuzzyTree, Term, Variable
@@ -39,11 +40,13 @@ class FilledStatistics:
     Attributes:
         statistics: Of the rows with what stands for missing cells; where a cell was
             missing or a text, those of the sample.
+        sample: Rows of it.
         stand_ins: What stands for a missing value, by column; NaN for nothing.
         categories: The categories of each column, none of numbers.
     """
 
     statistics: Statistics
+    sample: Sample
     stand_ins: FloatArray
     categories: tuple[tuple[str, ...], ...]
 
@@ -52,12 +55,12 @@ class FilledStatistics:
         """How many categories each column has, 0 for numbers."""
         return np.array([len(one) for one in self.categories], np.int64)
 
-    def without_last_column(self) -> FilledStatistics:
-        """Return the table without its last column."""
-        kept = range(len(self.categories) - 1)
-        return FilledStatistics(
-            self.statistics.of_columns(kept), self.stand_ins[:-1], self.categories[:-1]
-        )
+    def without_last_column(self) -> tuple[FilledStatistics, FloatArray]:
+        """Return the table without its last column, and this of the sample."""
+        statistics = self.statistics.of_columns(range(len(self.categories) - 1))
+        sample, last = self.sample.without_last_column()
+        columns = self.stand_ins[:-1], self.categories[:-1]
+        return FilledStatistics(statistics, sample, *columns), last
 
 
 def filled(
@@ -77,7 +80,7 @@ def filled(
     none = np.full(len(categories), math.nan)
     if drops and not any(categories):
         kept = statistics.complete() if statistics.dropped else statistics
-        return FilledStatistics(kept, none, (*categories,))
+        return FilledStatistics(kept, kept.sample(), none, (*categories,))
     raw = statistics.sample()
     if drops:
         is_whole = ~is_missing_code(raw.rows).any(axis=1)
@@ -93,11 +96,12 @@ def filled(
         ]
     )
     if not (statistics.dropped or any(categories)):
-        return FilledStatistics(statistics, stand_ins, (*categories,))
+        return FilledStatistics(statistics, raw, stand_ins, (*categories,))
     rows = np.where(np.isnan(rows), np.nan_to_num(stand_ins), rows)
     found = Statistics(statistics.classes, statistics.features, len(rows) or 1)
     found.update(rows, raw.codes)
-    return FilledStatistics(found, none if drops else stand_ins, (*categories,))
+    places = none if drops else stand_ins
+    return FilledStatistics(found, found.sample(), places, (*categories,))
 
 
 def _category(values: FloatArray) -> float:

@@ -32,7 +32,7 @@ from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
-from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
+from fuzzytree.learning.units import FloatArray, IntArray, tallied
 from fuzzytree.learning.weights import (
     MOST_COPIES,
     RowWeights,
@@ -55,13 +55,13 @@ class Learnt(msgspec.Struct, frozen=True):
     Attributes:
         tree: The tree.
         report: What was counted.
-        unseen: Which rows of a table the tree was not grown from; None if it was grown
-            from all rows, or in paper mode, or if they came in parts.
+        limits: The largest hash of a row of each class that the tree may have been
+            grown from (`rows_beyond`); empty where others than these count.
     """
 
     tree: FuzzyTree
     report: LearningReport
-    unseen: BoolArray | None = None
+    limits: tuple[int, ...] = ()
 
 
 def learn_arrays(
@@ -113,17 +113,7 @@ def learn_arrays(
         categories=categories or {},
     )
     learner.partial_fit(values, labels, weights=weights, progress=progress)
-    learnt = learner.finish(progress=progress)
-    if (
-        not learnt.report.sampled
-        or weights is not None
-        or learner.settings.mode == "paper"
-    ):
-        return learnt
-    coded, codes = learner.coded(values, labels)
-    return msgspec.structs.replace(
-        learnt, unseen=learner.statistics.leaves_out(coded, codes)
-    )
+    return learner.finish(progress=progress)
 
 
 @dataclass
@@ -181,9 +171,15 @@ class ArrayLearner:
                 no whole numbers come in chunks or in paper mode.
             LearningError: If `missing` is `refuse` and a value is missing.
         """
-        values, codes = self.coded(values, labels)
+        codes = _codes(labels, self.classes)
+        values = numbers_only(values, "the array")
+        _check_shape(values, codes, len(self.columns))
         if progress is not None:
             progress("counting", 0.0)
+        if self.categories:
+            values = codes_of_positions(
+                values.astype(np.float64), self.columns, self.categories
+            )
         found = None
         if weights is not None:
             found = row_weights(checked_weights(weights, len(values)))
@@ -205,25 +201,6 @@ class ArrayLearner:
             )
         if progress is not None:
             progress("counting", 1.0)
-
-    def coded(
-        self,
-        values: npt.NDArray[np.generic],
-        labels: Sequence[str] | npt.NDArray[np.generic],
-    ) -> tuple[npt.NDArray[np.generic], IntArray]:
-        """Return rows and classes as numbers that do not depend on the other rows.
-
-        Raises:
-            ValueError: If shapes and labels do not fit.
-        """
-        codes = _codes(labels, self.classes)
-        values = numbers_only(values, "the array")
-        _check_shape(values, codes, len(self.columns))
-        if self.categories:
-            values = codes_of_positions(
-                values.astype(np.float64), self.columns, self.categories
-            )
-        return values, codes
 
     def _refuse_shares(self, weights: RowWeights | None) -> None:
         """Make room for weights that are no whole numbers, a column behind the others.
@@ -289,7 +266,9 @@ class ArrayLearner:
         )
         if self.settings.mode != "paper":
             tree = described(tree, self.columns, ready.table, self.statistics)
-        return Learnt(tree, self._report(moments, sample, grown, made))
+        is_alone = self.settings.mode == "default" and not self._is_weighted
+        limits = self.statistics.limits() if is_alone else ()
+        return Learnt(tree, self._report(moments, sample, grown, made), limits)
 
     def front(self) -> Front | None:
         """Return how accurate small trees are, by columns a node and by leaves.
@@ -321,10 +300,10 @@ class ArrayLearner:
         if dropped and not (drops or np.isfinite(table.stand_ins[:width]).any()):
             raise LearningError(_INCOMPLETE.format(dropped))
         check_rows(table.statistics, self.classes, dropped)
-        sample, shares = table.statistics.sample(), np.ones(1)
+        shares = np.ones(1)
         if self._is_weighted:
-            sample, shares = sample.without_last_column()
-            table = table.without_last_column()
+            table, shares = table.without_last_column()
+        sample = table.sample
         moments = table.statistics.moments(sample.units)
         if not len(usable_features(moments)):
             raise LearningError(

@@ -17,8 +17,21 @@ import numpy.typing as npt
 
 from fuzzytree.cells import EXACT
 from fuzzytree.columns import is_missing_code
-from fuzzytree.learning.sampling import DistinctRows, Sample, usual_rows
-from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, padded, runs, sized
+from fuzzytree.learning.sampling import (
+    DistinctRows,
+    Sample,
+    hashed_digits,
+    usual_rows,
+)
+from fuzzytree.learning.sums import (
+    MOST_ROWS,
+    Sums,
+    Totals,
+    narrow,
+    padded,
+    runs,
+    sized,
+)
 from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
 
 BLOCK_VALUES = 1 << 18
@@ -137,7 +150,7 @@ class Statistics:
         self._rows.offer(values, codes)
         has_fraction = (np.floor(values) < values) | (np.abs(values) >= EXACT)
         self._fractions += np.count_nonzero(has_fraction, axis=0)
-        order = np.argsort(narrow(codes, self.classes), kind="stable")
+        order = np.argsort(narrow(codes), kind="stable")
         present, starts, counts = runs(codes[order])
         columns = np.take(values.T, order, axis=1)
         lows = np.fmin.reduceat(columns, starts, axis=1).T
@@ -292,17 +305,13 @@ class Statistics:
             self.rows_per_class or min(usual, self._rows.most),
         )
 
-    def leaves_out(self, values: npt.NDArray[np.generic], codes: IntArray) -> BoolArray:
-        """Return which rows of the table, as `update` took them, are not kept."""
+    def limits(self) -> tuple[int, ...]:
+        """Return the largest hash of a row that is kept of each class (`rows_beyond`).
+
+        2^64 - 1 where all rows are.
+        """
         self._absorb()
-        size = len(self._block)
-        is_out: BoolArray = codes >= 0
-        for first in range(0, len(values), size):
-            piece = np.asarray(values[first : first + size], np.float64)
-            own = slice(first, first + len(piece))
-            _copy_rows(piece, self._block[: len(piece)])
-            is_out[own] &= self._rows.leaves_out(self._block[: len(piece)], codes[own])
-        return is_out
+        return self._rows.limits()
 
     def of_columns(self, kept: Sequence[int]) -> Statistics:
         """Return the statistics of some of the columns."""
@@ -330,6 +339,26 @@ class Statistics:
         return found
 
 
+def rows_beyond(
+    values: FloatArray, codes: IntArray, limits: Sequence[int]
+) -> BoolArray:
+    """Return which rows have larger hashes than those that were kept of their class.
+
+    Args:
+        values: Shape (rows, features), as `Statistics.update` takes them.
+        codes: The class of each row, from 0.
+        limits: Those of the statistics of the table.
+    """
+    largest = np.array(limits, np.uint64)
+    is_beyond = np.zeros(len(values), bool)
+    for first in range(0, len(values), MOST_ROWS):
+        piece = slice(first, first + MOST_ROWS)
+        block = np.empty(values[piece].shape)
+        _copy_rows(values[piece], block)
+        is_beyond[piece] = hashed_digits(block) > largest[codes[piece]]
+    return is_beyond
+
+
 def _copy_rows(values: FloatArray, block: FloatArray) -> int:
     """Copy rows, equal numbers with equal bits; return how many miss a value."""
     # Adding zero makes a negative zero a positive one: they are equal numbers.
@@ -351,11 +380,6 @@ def finite_rows(values: FloatArray) -> BoolArray:
     if suspects.any():
         usable[suspects] = np.isfinite(values[suspects]).all(axis=1)
     return usable
-
-
-def narrow(codes: IntArray, classes: int) -> npt.NDArray[np.integer]:
-    """Return the codes in the smallest type, which sorts by radix."""
-    return codes.astype(np.uint16) if classes <= 1 << 16 else codes
 
 
 def grouped_moments(values: FloatArray, groups: IntArray, size: int) -> Moments:

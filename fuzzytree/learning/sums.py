@@ -172,6 +172,11 @@ def runs(codes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     return codes[starts], starts, counts
 
 
+def narrow(codes: IntArray) -> npt.NDArray[np.integer]:
+    """Return codes in the smallest type, which sorts by radix."""
+    return codes.astype(np.uint16) if codes.max(initial=0) < 1 << 16 else codes
+
+
 @dataclass
 class Sums:
     """Adds up columns and their squares by group, exactly.
