@@ -7,6 +7,7 @@ So the test takes a bounded time, and gives the same shares each time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -258,6 +259,12 @@ def _predicted(
     """Return the inputs of rows, their rules, and which have the class of the row."""
     places = np.array([table.columns.index(k) for k in tree.inputs], np.int64)
     values = table.values[np.ix_(places, rows)]
+    inputs = [v for v in tree.variables if not v.parts]
+    for row, variable in zip(values, inputs, strict=True):
+        own = table.categories.get(variable.name, ())
+        if own != variable.categories:  # the tree has another order
+            moved = np.array([*map(variable.categories.index, own), math.nan])
+            row[:] = moved[np.nan_to_num(row, nan=-1.0).astype(np.int64)]
     rules = baseline().load(tree)(values).rule
     ends = [-1, *(table.classes.index(leaf.label) for leaf in tree.leaves)]
     return values, rules, np.array(ends)[rules] == table.codes[rows]

@@ -21,9 +21,10 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.columns import is_missing_code, positions, text_codes
+from fuzzytree.learning.orders import category_orders
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.statistics import Statistics
-from fuzzytree.learning.units import FloatArray, IntArray
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 from fuzzytree.model import Band, FuzzyTree, Term, Variable
 
 MISSING = "missing"
@@ -43,30 +44,32 @@ class FilledStatistics:
         sample: Rows of it.
         stand_ins: What stands for a missing value, by column; NaN for nothing.
         categories: The categories of each column, none of numbers.
+        sizes: How many categories each column has; 0 for numbers, and for categories
+            that came in an order.
+        combinable: Which columns may enter combinations.
     """
 
     statistics: Statistics
     sample: Sample
     stand_ins: FloatArray
     categories: tuple[tuple[str, ...], ...]
-
-    @property
-    def sizes(self) -> IntArray:
-        """How many categories each column has, 0 for numbers."""
-        return np.array([len(one) for one in self.categories], np.int64)
+    sizes: IntArray
+    combinable: BoolArray
 
     def without_last_column(self) -> tuple[FilledStatistics, FloatArray]:
         """Return the table without its last column, and this of the sample."""
         statistics = self.statistics.of_columns(range(len(self.categories) - 1))
         sample, last = self.sample.without_last_column()
         columns = self.stand_ins[:-1], self.categories[:-1]
-        return FilledStatistics(statistics, sample, *columns), last
+        kinds = self.sizes[:-1], self.combinable[:-1]
+        return FilledStatistics(statistics, sample, *columns, *kinds), last
 
 
 def filled(
     statistics: Statistics,
     categories: Sequence[tuple[str, ...]],
     *,
+    is_ordered: Sequence[bool],
     drops: bool,
 ) -> FilledStatistics:
     """Return a table whose cells are all numbers, and what stands for missing ones.
@@ -74,34 +77,43 @@ def filled(
     Args:
         statistics: Of the table, with the codes of texts.
         categories: Of each column, empty for numbers.
+        is_ordered: Which columns have categories that came in an order, which they
+            keep; others get one (see `fuzzytree.learning.orders`).
         drops: Whether rows with a missing value are left out, as in the paper; nothing
             stands for a missing value then.
     """
     none = np.full(len(categories), math.nan)
-    if drops and not any(categories):
+    names = [*categories]
+    sizes = np.where(is_ordered, 0, [len(one) for one in names]).astype(np.int64)
+    combinable = sizes <= 2
+    if drops and not any(names):
         kept = statistics.complete() if statistics.dropped else statistics
-        return FilledStatistics(kept, kept.sample(), none, (*categories,))
+        return FilledStatistics(kept, kept.sample(), none, (*names,), sizes, combinable)
     raw = statistics.sample()
     if drops:
         is_whole = ~is_missing_code(raw.rows).any(axis=1)
         raw = raw.at(np.flatnonzero(is_whole))
     rows = raw.rows.copy()
-    for column, names in enumerate(categories):
-        if names:
-            rows[:, column] = positions(rows[:, column], names)
+    for column in np.flatnonzero([len(one) > 0 for one in names]).tolist():
+        rows[:, column] = positions(rows[:, column], names[column])
+    orders = category_orders(rows, raw.codes, sizes.tolist())
+    for column, (order, adds) in orders.items():
+        names[column] = tuple(names[column][place] for place in order.tolist())
+        rows[:, column] = positions(raw.rows[:, column], names[column])
+        combinable[column] = adds
     stand_ins = np.array(
         [
-            _category(values) if names else _number(values, raw.codes)
-            for values, names in zip(rows.T, categories, strict=True)
+            _category(values) if texts else _number(values, raw.codes)
+            for values, texts in zip(rows.T, names, strict=True)
         ]
     )
-    if not (statistics.dropped or any(categories)):
-        return FilledStatistics(statistics, raw, stand_ins, (*categories,))
-    rows = np.where(np.isnan(rows), np.nan_to_num(stand_ins), rows)
-    found = Statistics(statistics.classes, statistics.features, len(rows) or 1)
-    found.update(rows, raw.codes)
-    places = none if drops else stand_ins
-    return FilledStatistics(found, found.sample(), places, (*categories,))
+    if statistics.dropped or any(names):
+        rows = np.where(np.isnan(rows), np.nan_to_num(stand_ins), rows)
+        statistics = Statistics(statistics.classes, statistics.features, len(rows) or 1)
+        statistics.update(rows, raw.codes)
+        raw = statistics.sample()
+        stand_ins = none if drops else stand_ins
+    return FilledStatistics(statistics, raw, stand_ins, (*names,), sizes, combinable)
 
 
 def _category(values: FloatArray) -> float:

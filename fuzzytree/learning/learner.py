@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -74,6 +74,7 @@ def learn_arrays(
     name: str = "tree",
     settings: LearningSettings | None = None,
     categories: Mapping[str, tuple[str, ...]] | None = None,
+    ordered: Collection[str] = (),
     weights: Sequence[float] | npt.NDArray[np.generic] | None = None,
     progress: Progress | None = None,
 ) -> Learnt:
@@ -89,7 +90,9 @@ def learn_arrays(
         units: By column, for people.
         name: Of the tree.
         settings: How to learn.
-        categories: Of columns of text, by name; their values are positions.
+        categories: Of columns of text, by name; their values are positions. The tree
+            may have them in another order.
+        ordered: The columns whose categories keep their order.
         weights: Of the rows (see `fuzzytree.learning.weights`); all 1 unless given.
         progress: Called with what is being done and its share done, 0 to 1.
 
@@ -111,6 +114,7 @@ def learn_arrays(
         name=name,
         settings=settings or LearningSettings(),
         categories=categories or {},
+        ordered=ordered,
     )
     learner.partial_fit(values, labels, weights=weights, progress=progress)
     return learner.finish(progress=progress)
@@ -126,7 +130,9 @@ class ArrayLearner:
         units: By column.
         name: Of the tree.
         settings: How to learn.
-        categories: By column; none of a column of numbers.
+        categories: By column; none of a column of numbers. The tree may have them in
+            another order.
+        ordered: The columns whose categories keep their order.
 
     Example:
         >>> learner = ArrayLearner(columns=["cm"], classes=["small", "big"])
@@ -144,6 +150,7 @@ class ArrayLearner:
     categories: Mapping[str, tuple[str, ...]] = field(
         default_factory=dict[str, tuple[str, ...]]
     )
+    ordered: Collection[str] = ()
     statistics: Statistics = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -293,9 +300,11 @@ class ArrayLearner:
                 "\n  leave these columns out with ignore, or learn in default mode"
             )
         categories = [self.categories.get(name, ()) for name in self.columns]
+        is_ordered = [name in self.ordered for name in self.columns]
         if self._is_weighted:
             categories.append(())
-        table = filled(self.statistics, categories, drops=drops)
+            is_ordered.append(False)
+        table = filled(self.statistics, categories, is_ordered=is_ordered, drops=drops)
         dropped = self.statistics.dropped
         if dropped and not (drops or np.isfinite(table.stand_ins[:width]).any()):
             raise LearningError(_INCOMPLETE.format(dropped))
@@ -324,7 +333,11 @@ class ArrayLearner:
         settings, sample = self.settings, ready.sample
         kept = np.bincount(sample.codes, minlength=len(self.classes))
         rows = TrainingRows.of(
-            sample, ready.weights, len(self.classes), ready.table.sizes
+            sample,
+            ready.weights,
+            len(self.classes),
+            ready.table.sizes,
+            ready.table.combinable,
         )
         rules = SplitRules(
             min_rows=settings.min_rows or min(_MIN_ROWS, int(kept[kept > 0].min())),

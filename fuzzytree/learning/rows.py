@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fuzzytree.learning.sampling import Sample
-from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray
+from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
 
 MOST_SEARCHED = 4_096
 """Splits by one column look at no more columns than this, the most powerful ones."""
@@ -34,7 +34,8 @@ class TrainingRows:
         weights: How many rows of the table each stands for, times its own weight.
         classes: How many classes there are.
         units: The columns' units.
-        categories: By column, how many categories it has; 0 for numbers.
+        categories: By column, how many categories without an order it has; 0 for
+            numbers.
         searched: The columns that splits look at.
         bins: The number of each row's bin, shape (rows, searched).
         owners: The searched column (its place in `searched`) of each bin.
@@ -63,7 +64,11 @@ class TrainingRows:
 
     @staticmethod
     def of(
-        sample: Sample, weights: FloatArray, classes: int, categories: IntArray
+        sample: Sample,
+        weights: FloatArray,
+        classes: int,
+        categories: IntArray,
+        combinable: BoolArray,
     ) -> TrainingRows:
         """Prepare a sample.
 
@@ -71,18 +76,18 @@ class TrainingRows:
             sample: The rows.
             weights: Of the rows.
             classes: How many classes there are.
-            categories: By column, how many categories it has; 0 for numbers.
+            categories: By column, how many categories without an order it has.
+            combinable: Which columns combinations may use, as far as they vary.
         """
         moved, units = sample.moved, sample.units
         searched = _varying(sample, weights, MOST_SEARCHED)
         bins, starts = _binned(moved, searched)
-        is_number = (categories <= 2) & units.is_combinable
-        combinable = searched[is_number[searched]]
-        if len(combinable) > MOST_COMBINABLE:
-            leading = _power(sample, weights, combinable)
+        combined = searched[(combinable & units.is_combinable)[searched]]
+        if len(combined) > MOST_COMBINABLE:
+            leading = _power(sample, weights, combined)
             order = np.argsort(-leading, kind="stable")[:MOST_COMBINABLE]
-            combinable = np.sort(combinable[order])
-        chosen = moved[:, combinable]
+            combined = np.sort(combined[order])
+        chosen = moved[:, combined]
         centres, spreads = chosen.mean(axis=0), chosen.std(axis=0)
         spreads = np.where(spreads > 0, spreads, 1.0)
         standard = np.clip((chosen - centres) / spreads, -_FAR, _FAR)
@@ -98,7 +103,7 @@ class TrainingRows:
             bins,
             np.repeat(np.arange(len(searched)), np.diff(starts)),
             starts,
-            combinable,
+            combined,
             centres,
             spreads,
             standard,
