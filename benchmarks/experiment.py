@@ -63,7 +63,7 @@ class ExperimentOptions(ResultOptions):
     )
     mode: Literal["default", "paper"] | None = option(
         "--mode",
-        "`paper` is the paper's learner without its step 7.",
+        "`paper` is the paper's learner.",
         choices=["default", "paper"],
     )
     shrinkage: float | None = option(

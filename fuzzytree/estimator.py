@@ -143,7 +143,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     of each combination, and no training rows.
 
     Args:
-        mode: `default`, or `paper` for the paper's algorithm without its step 7.
+        mode: `default`, or `paper` for the paper's algorithm.
         columns_per_node: How many columns a node looks at, at most; 1 gives rules in
             the table's own words, None as many as help.
         leaves: How many leaves the tree has, at most.

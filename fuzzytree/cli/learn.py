@@ -97,7 +97,7 @@ class TreeOptions:
     heading: str = "Tree"
     mode: Any = option(
         "--mode",
-        "Learner: the default one, or that of the paper without its step 7.",
+        "Learner: the default one, or that of the paper.",
         choices=["default", "paper"],
         default="default",
     )

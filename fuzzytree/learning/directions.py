@@ -1,4 +1,4 @@
-"""Step 7 of the paper: the next powerful feature is linearly combined.
+"""Linear combinations of columns.
 
 A combination parts two groups of a node's rows. Columns enter it one after another, the
 most powerful first, until another one no longer helps (a partial F test); its weights
@@ -15,10 +15,12 @@ import numpy as np
 from fuzzytree.learning.cuts import SplitAxis, rounded_to
 from fuzzytree.learning.nodes import Chosen, SplitRules
 from fuzzytree.learning.rows import TrainingRows
-from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
+from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
+
+MOST_COLUMNS = 64
+"""A combination has no more columns than this."""
 
 _MOST_ROWS = 4_000
-_MOST_COLUMNS = 64
 _NEWTON_STEPS = 6
 _OWN = 1e-12
 _FINE = 1e-5
@@ -36,7 +38,8 @@ def shrunk(scatter: FloatArray, shrinkage: float) -> FloatArray:
     return shrunk
 
 
-def _solved(scatter: FloatArray, step: FloatArray) -> FloatArray:
+def solved(scatter: FloatArray, step: FloatArray) -> FloatArray:
+    """Return the solution of a linear system, the shortest one if it is singular."""
     try:
         solution = np.linalg.solve(scatter, step)
     except np.linalg.LinAlgError:
@@ -76,7 +79,7 @@ def axis_towards(
     direction: FloatArray | None
     if is_fine:
         means, scatter = _two_groups(chosen, sides, weights, rules.shrinkage)
-        direction = _solved(scatter, means[1] - means[0])
+        direction = solved(scatter, means[1] - means[0])
     else:
         direction = logistic_direction(chosen, sides, weights, 1.0)
     if direction is None:
@@ -128,7 +131,7 @@ def selected_columns(
     prices = np.maximum(costs, _CHEAPEST)
     selected: list[int] = []
     power = 0.0
-    for _ in range(min(rules.columns, _MOST_COLUMNS, len(step))):
+    for _ in range(min(rules.columns, MOST_COLUMNS, len(step))):
         variances = np.einsum("ii->i", rest)
         is_free = variances > _OWN * original
         is_free[selected] = False
@@ -219,23 +222,40 @@ def _logistic(
 def axis_of(
     rows: TrainingRows, selected: IntArray, direction: FloatArray, unit: float
 ) -> SplitAxis | None:
-    """Return an axis in the table's units from a direction in standard units.
+    """Return an axis in the table's units from a direction in standard units."""
+    columns, spreads = rows.combinable[selected], rows.spreads[selected]
+    return rounded_axis(columns, direction, unit, spreads, rows.units)
+
+
+def rounded_axis(
+    columns: IntArray,
+    direction: FloatArray,
+    unit: float,
+    spreads: FloatArray,
+    units: ColumnUnits,
+) -> SplitAxis | None:
+    """Return an axis in the table's units from a direction in units of spreads.
 
     Its unit is the spread of the groups that it parts. A weight is rounded so finely
     that a spread of its column changes by no more than a thousandth of that unit.
     Centres are the columns' origins, values of the table, so that the first step of an
     axis, value less centre, has the digits that learning saw. None where fewer than two
     columns have a weight.
+
+    Args:
+        columns: Their numbers.
+        direction: The weight of each column.
+        unit: The spread along the direction.
+        spreads: Of the columns, in their units.
+        units: The columns' units.
     """
-    columns = rows.combinable[selected]
     longest = math.sqrt(float(direction @ direction))
     length = max(unit, _SMALLEST * longest)
-    scales = rows.spreads[selected]
     weights = np.array(
         [
             rounded_to(weight, -_DIGITS - math.frexp(scale)[1])
             for weight, scale in zip(
-                (direction / length / scales).tolist(), scales.tolist(), strict=True
+                (direction / length / spreads).tolist(), spreads.tolist(), strict=True
             )
         ]
     )
@@ -243,5 +263,5 @@ def axis_of(
     if np.count_nonzero(keep) < 2:
         return None
     chosen = columns[keep]
-    raw = np.ldexp(weights[keep], -rows.units.exponents[chosen])
-    return SplitAxis(chosen, raw, rows.units.origins[chosen], True)
+    raw = np.ldexp(weights[keep], -units.exponents[chosen])
+    return SplitAxis(chosen, raw, units.origins[chosen], True)

@@ -1,4 +1,4 @@
-"""Steps 3 to 6 of the paper (2.3): the most powerful feature splits a node.
+"""Steps 4 and 5 of the paper (2.3): the most powerful feature splits a node.
 
 Patterns i and j are `d = alpha |M_i - M_j| + beta |SD_i - SD_j|` apart on a feature.
 Those closer than `T = M_SD (L_MAX - L) / 2` belong together, and so does what they are

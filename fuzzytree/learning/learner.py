@@ -362,6 +362,8 @@ class ArrayLearner:
             l_max=settings.l_max or 4.0,
             costs=ready.costs,
             keep_reversals=settings.keep_reversals,
+            columns=settings.columns_per_node or len(self.columns),
+            shrinkage=settings.shrinkage,
         )
         grown = grow(patterns, rules, lambda share: progress("growing", share))
         leaves = grown.sketch.descend(patterns.rows)

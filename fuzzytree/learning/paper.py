@@ -1,8 +1,14 @@
-"""The paper's tree: it grows from its root over fuzzy patterns, one feature a node."""
+"""The paper's tree (2.3): it grows from its root over fuzzy patterns.
+
+A node tests the most powerful feature (steps 4 and 5). Where no feature splits it, the
+most powerful ones are linearly combined (step 7): Fisher's direction over the widest 2,
+3, ... of them, and what it gives is a feature as any other.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +21,20 @@ from fuzzytree.learning.cuts import (
     crossing_cuts,
     single,
 )
-from fuzzytree.learning.induction import Grouping, most_powerful, threshold
+from fuzzytree.learning.directions import (
+    MOST_COLUMNS,
+    rounded_axis,
+    shrunk,
+    solved,
+)
+from fuzzytree.learning.induction import most_powerful, threshold
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.units import FloatArray, IntArray
 
 _NODE_ROWS = 20_000
+_ROWS_PER_COLUMN = 3
+_CELLS = 1 << 22  # of the scatters of all patterns of a node
+_POWER = 32  # of the matrix that turns a direction towards Fisher's
 
 
 @dataclass(frozen=True)
@@ -31,12 +46,16 @@ class GrowthRules:
         l_max: L_MAX.
         costs: Per column.
         keep_reversals: Whether far reversals keep their cut.
+        columns: How many columns a node may combine.
+        shrinkage: Of the scatter within patterns.
     """
 
     alpha: float
     l_max: float
     costs: FloatArray
     keep_reversals: bool
+    columns: int
+    shrinkage: float
 
 
 @dataclass
@@ -61,7 +80,7 @@ def grow(
     rules: GrowthRules,
     progress: Callable[[float], None] | None = None,
 ) -> GrownTree:
-    """Return a tree with at most one leaf per pattern (steps 3 to 6)."""
+    """Return a tree with at most one leaf per pattern (steps 3 to 7)."""
     grown = GrownTree(Sketch())
     sketch = grown.sketch
     everything = np.flatnonzero(patterns.weights > 0).astype(np.int64)
@@ -93,6 +112,23 @@ def grow(
     return grown
 
 
+@dataclass(frozen=True)
+class _Features:
+    """What a node can test: columns, or combinations of them.
+
+    Attributes:
+        axes: One for each feature, made where it is needed.
+        means: M of the node's patterns, shape (patterns, features).
+        spreads: SD, same shape.
+        costs: Per feature.
+    """
+
+    axes: Callable[[int], SplitAxis]
+    means: FloatArray
+    spreads: FloatArray
+    costs: FloatArray
+
+
 def _split_at(
     patterns: Patterns,
     chosen: IntArray,
@@ -100,45 +136,157 @@ def _split_at(
     rules: GrowthRules,
     grown: GrownTree,
 ) -> tuple[TreeSplit, int] | None:
-    """Split by one feature; while none splits, the level rises and T falls to 0."""
+    """Split by one feature, or else by a combination of features.
+
+    While neither splits, the level rises and T falls to 0; single features come last.
+    """
     if len(chosen) < 2:
         return None
-    place, moments = np.ix_(chosen, patterns.usable), patterns.moments
-    means, spreads = moments.means[place], moments.spreads[place]
-    costs = rules.costs[patterns.usable]
-    while True:
-        limits = threshold(spreads, rules.l_max, level)
-        found = most_powerful(
-            means, spreads, limits, alpha=rules.alpha, costs=costs, by_margin=False
-        )
-        if found is not None:
-            return _grouped_split(patterns, chosen, found, rules, grown), level
-        if level >= rules.l_max:
-            return None
-        level += 1
-        grown.levels_raised += 1
+    usable, moments = patterns.usable, patterns.moments
+    place = np.ix_(chosen, usable)
+    columns = _Features(
+        lambda k: single(int(usable[k])),
+        moments.means[place],
+        moments.spreads[place],
+        rules.costs[usable],
+    )
+    split = _best_split(patterns, chosen, columns, level, rules, grown)
+    if split is not None:
+        return split, level
+    combinations = _combinations(patterns, chosen, columns, rules)
+    for features in (combinations, columns):
+        for higher in _levels(level, rules.l_max):
+            split = _best_split(patterns, chosen, features, higher, rules, grown)
+            if split is not None:
+                grown.levels_raised += higher - level
+                return split, higher
+    return None
 
 
-def _grouped_split(
+def _levels(level: int, l_max: float) -> Iterable[int]:
+    """Return the levels from a node's own to the first at which T is 0."""
+    return range(level, max(level, math.ceil(l_max)) + 1)
+
+
+def _best_split(
     patterns: Patterns,
     chosen: IntArray,
-    found: Grouping,
+    features: _Features,
+    level: int,
     rules: GrowthRules,
     grown: GrownTree,
-) -> TreeSplit:
-    feature = int(patterns.usable[found.feature])
+) -> TreeSplit | None:
+    """Return the split by the most powerful feature at a level, or None."""
+    limits = threshold(features.spreads, rules.l_max, level)
+    found = most_powerful(
+        features.means,
+        features.spreads,
+        limits,
+        alpha=rules.alpha,
+        costs=features.costs,
+        by_margin=False,
+    )
+    if found is None:
+        return None
     group_of = np.zeros(len(chosen), np.int64)
     for number, group in enumerate(found.groups):
         group_of[group] = number
     cuts = crossing_cuts(
-        patterns.moments.means[chosen, feature],
-        patterns.moments.spreads[chosen, feature],
+        features.means[:, found.feature],
+        features.spreads[:, found.feature],
         group_of,
         keep_reversals=rules.keep_reversals,
     )
     grown.reversals += cuts.reversals
     groups = tuple(chosen[group] for group in found.groups)
-    return finished_split(patterns, single(feature), cuts, groups)
+    return finished_split(patterns, features.axes(found.feature), cuts, groups)
+
+
+def _combinations(
+    patterns: Patterns, chosen: IntArray, columns: _Features, rules: GrowthRules
+) -> _Features:
+    """Return Fisher's directions over the widest 2, 3, ... columns of a node (step 7).
+
+    The widest column has the largest range of M in units of M_SD; of equally wide ones
+    the cheaper comes first. M and SD of a combination are those of the rows kept, and
+    its cost is that of its columns.
+    """
+    usable = patterns.usable
+    with np.errstate(divide="ignore", invalid="ignore"):
+        widths = np.ptp(columns.means, axis=0) / columns.spreads.mean(axis=0)
+    order = np.lexsort((columns.costs, -widths))
+    order = order[(widths[order] > 0) & patterns.units.is_combinable[usable[order]]]
+    most = min(
+        rules.columns,
+        MOST_COLUMNS,
+        len(patterns.members(chosen)) // _ROWS_PER_COLUMN,
+        math.isqrt(_CELLS // len(chosen)),
+    )
+    widest = usable[order[:most]]
+    scale = patterns.scale[widest]
+    means, scatters = _scatters(patterns, chosen, widest)
+    within = scatters.mean(axis=0)
+    axes: list[SplitAxis] = []
+    weights: list[FloatArray] = []
+    for size in range(2, len(widest) + 1):
+        scatter = shrunk(within[:size, :size], rules.shrinkage)
+        direction = _fishers_direction(means[:, :size], scatter)
+        if not direction.any():
+            continue
+        variances = direction @ scatters[:, :size, :size] @ direction
+        spread = float(np.sqrt(np.maximum(variances, 0.0)).mean())
+        axis = rounded_axis(
+            widest[:size], direction, spread, scale[:size], patterns.units
+        )
+        if axis is not None:
+            at = np.isin(widest, axis.features)
+            weight = np.ldexp(axis.weights, patterns.units.exponents[axis.features])
+            weights.append(np.zeros(len(widest)))
+            weights[-1][at] = weight * scale[at]
+            axes.append(axis)
+    every = np.array(weights).reshape(len(weights), len(widest))
+    variances = np.einsum("kv,pvw,kw->pk", every, scatters, every, optimize=True)
+    spreads = np.sqrt(np.maximum(variances, 0.0))
+    costs = (every != 0) @ rules.costs[widest]
+    return _Features(lambda k: axes[k], means @ every.T, spreads, costs)
+
+
+def _scatters(
+    patterns: Patterns, chosen: IntArray, columns: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the mean and the scatter of the rows of each pattern, in standard units.
+
+    Shapes (patterns, columns) and (patterns, columns, columns).
+    """
+    scale = patterns.scale[columns]
+    means = np.empty((len(chosen), len(columns)))
+    scatters = np.empty((*means.shape, len(columns)))
+    for k, pattern in enumerate(chosen.tolist()):
+        rows = patterns.moved[patterns.starts[pattern] : patterns.starts[pattern + 1]]
+        points = rows[:, columns] / scale
+        means[k] = points.mean(axis=0)
+        points -= means[k]
+        scatters[k] = points.T @ points / max(len(points) - 1, 1)
+    return means, scatters
+
+
+def _fishers_direction(means: FloatArray, scatter: FloatArray) -> FloatArray:
+    """Return the direction in which patterns differ most for the scatter within them.
+
+    Of two patterns it is Fisher's. Of more it is the leading eigenvector of the scatter
+    between them over that within, towards which the direction of the farthest pattern
+    is turned; where two eigenvalues are equal, rounding does not decide.
+    """
+    moved = means - means.mean(axis=0)
+    directions = solved(scatter, moved.T)
+    ratio = directions @ moved
+    total = float(np.trace(ratio))
+    if not total > 0.0:
+        return np.zeros(len(scatter))
+    distances = np.einsum("pv,vp->p", moved, directions) / total
+    farthest = directions[:, int(np.round(distances, 9).argmax())]
+    turned: FloatArray = np.linalg.matrix_power(ratio / total, _POWER) @ farthest
+    return turned
 
 
 def finished_split(

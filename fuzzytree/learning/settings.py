@@ -20,17 +20,18 @@ class LearningSettings(
     """How a tree is learnt.
 
     Attributes:
-        mode: `paper` is the paper's algorithm without its step 7, the combination of
-            features: fuzzy patterns of the classes, one feature in a node, ties to the
-            first feature. `default` scores each split by
+        mode: `paper` is the paper's algorithm: fuzzy patterns of the classes, the
+            feature that makes the most groups of them in each node, and a combination
+            of features where no single one splits it. `default` scores each split by
             the classes of the rows, and held-out rows prune the tree.
         columns_per_node: How many columns a node looks at, at most; 1 gives rules in
-            the table's own words. None: as many as help.
+            the table's own words, and paper mode without its step 7. None: as many as
+            help.
         leaves: How many leaves the tree has, at most.
         min_rows: How many rows a leaf holds, at least.
         depth: How many conditions lead to a leaf, at most.
         entry: How much a further column must help a combination: the smallest
-            partial F; 0 takes every column that helps at all.
+            partial F; 0 takes every column that helps at all. Of default mode.
         shrinkage: How far the off-diagonal of a scatter is shrunk, in [0, 1).
         alpha: Weight of the difference of means in the paper's distance; beta is
             1 - alpha. None is 0.9. Of paper mode, as the next two.
@@ -229,7 +230,7 @@ def refuse_unknown(taker: str, names: Iterable[str], fields: Collection[str]) ->
 
 
 _OF_MODE = {
-    "default": ("columns_per_node", "leaves", "min_rows", "depth", "class_weight"),
+    "default": ("leaves", "min_rows", "depth", "class_weight"),
     "paper": ("alpha", "l_max", "patterns_per_class", "keep_reversals"),
 }
 """Settings that one mode alone has."""

@@ -38,11 +38,21 @@ def blobs(rows: int, *, step: float = 0.0, seed: int = 0) -> Table:
     return np.round(values / step) * step if step else values, labels
 
 
+def ridges() -> Table:
+    """Return three classes that a combination of columns alone separates."""
+    rng = np.random.default_rng(0)
+    labels = np.repeat([0, 1, 2], 150)
+    along = 5.0 * rng.normal(size=450)
+    across = 4.0 * labels + rng.normal(size=450)
+    return np.column_stack([along, along + across, rng.normal(size=450)]), labels
+
+
 TABLES: dict[str, Callable[[], Table]] = {
     "iris": lambda: public("iris"),
     "wine": lambda: public("wine"),
     "sampled": lambda: blobs(1_500),
     "sampled whole numbers": lambda: blobs(1_500, step=1.0),
+    "ridges": ridges,
 }
 ROWS_PER_CLASS = 100
 """Fewer than the rows of a class in the tables that are sampled."""
