@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from fuzzytree.cells import EXACT
 from fuzzytree.errors import TableError
+from fuzzytree.model import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -313,8 +314,3 @@ def number_array(column: pa.ChunkedArray) -> npt.NDArray[np.generic]:
         column = pc.call_function("coalesce", [column, nan.cast(column.type)])
     parts = [np.from_dlpack(chunk) for chunk in column.chunks]
     return parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty(0)])
-
-
-def counted(count: int, what: str) -> str:
-    """Return a number of things: `1 cell`, `2 cells`."""
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -70,7 +70,7 @@ from fuzzytree.columns import (
     text_of,
     text_order,
 )
-from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, counted, no_text, number_array
+from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, no_text, number_array
 from fuzzytree.errors import MissingExtraError, TableError, install_hint
 from fuzzytree.files import LIMIT, check_stream, reason
 from fuzzytree.model import (
@@ -78,6 +78,7 @@ from fuzzytree.model import (
     LabelType,
     Variable,
     as_names,
+    counted,
     is_label,
     label_type_of,
 )

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import TypedDict, TypeVar
+from typing import TYPE_CHECKING, TypedDict, TypeVar
 
 import msgspec
 
-from fuzzytree.auditing import Limits, Within
 from fuzzytree.learning import refuse_unknown
 from fuzzytree.model import Kind
+
+if TYPE_CHECKING:  # which learning and predicting do not need
+    from fuzzytree.auditing import Limits, Within
 
 S = TypeVar("S", bound=msgspec.Struct)
 

@@ -10,8 +10,6 @@ from .decide.states import Sampled as Sampled
 from .decide.states import Span as Span
 from .decide.states import State as State
 from .decide.states import Witness as Witness
-from .decide.states import counted as counted
-from .decide.states import number_text as number_text
 from .decide.states import point_of as point_of
 from .diff.differences import check_common_inputs as check_common_inputs
 from .diff.differences import common_domain as common_domain

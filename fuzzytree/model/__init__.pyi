@@ -93,6 +93,8 @@ from .naming import LETTERS as LETTERS
 from .naming import NameMap as NameMap
 from .naming import as_names as as_names
 from .naming import changes_text as changes_text
+from .naming import counted as counted
+from .naming import number_text as number_text
 from .naming import numbered as numbered
 from .naming import printable as printable
 from .naming import printable_json as printable_json

@@ -44,6 +44,21 @@ def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
+def counted(count: int, noun: str, nouns: str | None = None) -> str:
+    """Return a count with its noun.
+
+    Example:
+        >>> counted(1, "rule"), counted(2, "box", "boxes")
+        ('1 rule', '2 boxes')
+    """
+    return f"{count} {noun if count == 1 else nouns or noun + 's'}"
+
+
+def number_text(number: float) -> str:
+    """Return a value of an input in six digits, as sentences show it."""
+    return f"{number:.6g}"
+
+
 def printable(text: str) -> str:
     r"""Return a text for a terminal; what that might obey is written as an escape.
 

@@ -7,14 +7,8 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from fuzzytree.auditing import counted as counted
-from fuzzytree.auditing import number_text
-from fuzzytree.model import (
-    Agreement,
-    Certified,
-    Comparison,
-    printable,
-)
+from fuzzytree.model import Agreement, Certified, Comparison, number_text, printable
+from fuzzytree.model import counted as counted
 
 _MOST_PAIRS = 6  # points that a line of text shows one by one
 UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))

@@ -74,6 +74,17 @@ def test_a_verb_loads_no_library_that_it_does_not_need(folder: Path) -> None:
     }
 
 
+def test_learning_and_predicting_do_not_load_the_decider_of_audits(
+    folder: Path,
+) -> None:
+    lines = [
+        LEARN,
+        ("run", "grip.yaml", "grasps.csv", "--quiet"),
+        ("show", "grip.yaml"),
+    ]
+    assert loaded(folder, lines, ("fuzzytree.auditing.decide",)) == [[0]] * 3
+
+
 @pytest.mark.heavy
 def test_verbs_that_read_a_model_load_neither_learner_nor_check(folder: Path) -> None:
     lines = [("show", "grip.yaml"), ("run", "grip.yaml", "grasps.csv", "--quiet")]

@@ -8,6 +8,8 @@ from fractions import Fraction
 from typing import Literal
 
 from fuzzytree.model import Value
+from fuzzytree.model import counted as counted
+from fuzzytree.model import number_text as number_text
 
 Representation = Literal["rules", "tree", "raw rules", "old", "new"]
 """Which model a claim is about: the audited rules, their tree, its raw rules, or one of
@@ -205,22 +207,7 @@ def point_of(result: Iterable[Coordinate]) -> dict[str, Fraction]:
     return {at.input: Fraction(at.exact) for at in result}
 
 
-# --- counts, numbers and names in sentences
-
-
-def counted(count: int, noun: str, nouns: str | None = None) -> str:
-    """Return a count with its noun.
-
-    Example:
-        >>> counted(1, "rule"), counted(2, "box", "boxes")
-        ('1 rule', '2 boxes')
-    """
-    return f"{count} {noun if count == 1 else nouns or noun + 's'}"
-
-
-def number_text(number: float) -> str:
-    """Return a value of an input in six digits, as sentences show it."""
-    return f"{number:.6g}"
+# --- names in sentences
 
 
 def answer_text(label: str | None) -> str:
