@@ -182,7 +182,7 @@ def test_the_report_says_of_which_classes_rows_were_left_out() -> None:
     assert not FuzzyTreeClassifier().fit(values, labels).report_.sampled
     many = FuzzyTreeClassifier(rows_per_class=2, mode="paper")
     text = str(many.fit(np.arange(20.0)[:, None], np.arange(20) // 4).report_)
-    assert "2 of 4 rows of class '2', 2 more classes" in text
+    assert "2 of 4 rows of class '1', 3 more classes" in text
 
 
 def test_chunks_may_have_whole_weights() -> None:

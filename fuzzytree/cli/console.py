@@ -255,7 +255,8 @@ categorical_option = several(
 
 rows_per_class_option = option(
     "--rows-per-class",
-    "Largest number of rows per class that the learner keeps.",
+    "Largest number of rows per class that the learner keeps; by default 20,000, or "
+    "fewer of many columns and classes.",
     type=click.IntRange(min=1),
 )
 

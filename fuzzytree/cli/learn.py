@@ -211,6 +211,8 @@ def command(options: LearnOptions) -> None:
     is_state = _is_states(options)
     if options.weight is not None and (is_state or options.model is not None):
         raise click.UsageError("--weight: states count rows, which have no weights")
+    if options.rows_per_class is not None and is_state:
+        raise click.UsageError("--rows-per-class: states have kept their rows already")
     work = _learnt if options.model is None else _counted
     tree, rows, facts = work(options, is_state=is_state)
     _write(options, tree, rows, form, is_data=not is_state and options.tables[0] != "-")

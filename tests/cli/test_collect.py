@@ -78,6 +78,10 @@ def test_facts_are_printed_as_json(
         (["collect", "part0.csv", "none.csv"], "none.csv: cannot be read"),
         (["learn", "part0.csv", "part1.csv"], "several tables: collect each of them"),
         (["learn", "part0.state", "part0.state"], "pass --repeated to count its rows"),
+        (
+            ["learn", "part0.state", "--rows-per-class", "9"],
+            "--rows-per-class: states have kept their rows already",
+        ),
         (["learn", "part0.state", "cut.state"], "cut.state: is no state that"),
         (["learn", "part0.state", "--target", "ash"], "the states have 'cultivar'"),
         (["learn", "part0.csv"], "name the column of the classes with --target"),
