@@ -37,6 +37,8 @@ from fuzzytree.exporters.fuzzy_files import (
 )
 from fuzzytree.formats import FACTS, MARK, read_fcl
 from fuzzytree.model import (
+    DATE_UNIT,
+    Band,
     Format,
     FuzzySystem,
     NameMap,
@@ -46,8 +48,10 @@ from fuzzytree.model import (
     Variable,
     Written,
     joints,
+    printable,
     refusal,
 )
+from fuzzytree.rechecking import interval_word
 from fuzzytree.semantics import (
     Always,
     Scores,
@@ -126,6 +130,7 @@ def write(
     comments = [one for one in (MARK + dialect, facts and FACTS + facts) if one]
     if checklist:
         comments += [f" {line}" for line in check_list(system).splitlines()]
+    comments += [f" {line}" for line in _table_words(model)]
     comments.append(f" {TITLE}")
     start, end = ("(*", " *)") if dialect == "iec" else ("//", "")
     lines = [f"{start}{one}{end}" for one in comments]
@@ -133,6 +138,22 @@ def write(
     remarks += _remarks(system, names, words)
     text = "\n".join(lines) + "\n"
     return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
+
+
+def _table_words(model: RuleBase | FuzzySystem) -> Iterator[str]:
+    """Yield what the numbers of dates and categories mean, and terms in their words."""
+    for one in model.variables:
+        if not (one.categories or one.unit == DATE_UNIT):
+            continue
+        places = [f"{place} is {name}" for place, name in enumerate(one.categories)]
+        for term in one.terms:
+            band = term.function
+            if isinstance(band, Band):
+                word = interval_word(one, band.low, band.high, "up to")
+                places.append(f"{term.name!r} is {word.replace('> ', 'after ')}")
+        about = one.unit if one.unit else "positions of categories"
+        line = printable(f"{one.name!r}, {about}: {'; '.join(places)}")
+        yield line.replace("*", "* ")  # which ends no comment of the dialect iec
 
 
 class _FclNames(FileNames, frozen=True):

@@ -54,10 +54,13 @@ from fuzzytree.rechecking.two_models import recheck_difference
 from fuzzytree.rechecking.words import (
     DATE_UNIT,
     MISSING,
+    interval_word,
     is_plain,
+    minute_word,
     side_values,
     stretch,
     stretch_word,
+    table_word,
     value_word,
 )
 from fuzzytree.rechecking.yaml import MOST_BYTES, read_yaml
@@ -72,7 +75,9 @@ __all__ = [
     "claims_text",
     "confirm",
     "digest_of",
+    "interval_word",
     "is_plain",
+    "minute_word",
     "model_text",
     "names_in",
     "open_interval",
@@ -85,6 +90,7 @@ __all__ = [
     "side_values",
     "stretch",
     "stretch_word",
+    "table_word",
     "value_word",
 ]
 

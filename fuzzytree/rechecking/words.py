@@ -12,6 +12,7 @@ MISSING = "missing"  # the word for the stand-in of a missing value
 MOST_LISTED = 4096  # beyond, shares are those of lengths, and not of counts
 _EPOCH = datetime.datetime(1970, 1, 1)
 _DAY = 86_400_000_000  # microseconds
+_MOST_DAYS = 4e6  # beyond, years have more than four digits
 
 Column = Any
 """What a model says about an input: its `categories` and `unit`."""
@@ -82,13 +83,47 @@ def value_word(column: Column, side: Side | None, value: Fraction) -> str:
         return ""
     if value == side.missing and stretch(side, value, value).has_missing:
         return MISSING
-    if column.categories:
-        place = int(value)
-        is_one = value == place and 0 <= place < len(column.categories)
-        return column.categories[place] if is_one else ""
-    if column.unit == DATE_UNIT:
-        return _date(value)
+    if column.categories or column.unit == DATE_UNIT:
+        return table_word(column, value)
     return f"{value} {column.unit}".rstrip() if side.is_whole else ""
+
+
+def table_word(column: Column, value: Fraction | float) -> str:
+    """Return the category or the date that a value is; empty of a number."""
+    if column.categories:
+        is_one = value in range(len(column.categories))
+        return column.categories[int(value)] if is_one else ""
+    is_date = column.unit == DATE_UNIT and math.isfinite(value)
+    return _date(Fraction(value)) if is_date else ""
+
+
+def minute_word(column: Column, value: float) -> str:
+    """Return a category or date for people: the day of whole ones, else the minute."""
+    if column.unit == DATE_UNIT and abs(value) < _MOST_DAYS:
+        value = math.floor(value) if column.is_whole else round(value * 1440) / 1440
+    return table_word(column, value).removesuffix(":00")
+
+
+def interval_word(
+    column: Column, low: float | None, high: float | None, most: str = "<="
+) -> str:
+    """Return the categories or dates above low and up to high; empty of numbers.
+
+    An end is None where there is none; `most` is the sign for "up to".
+    """
+    if column.categories:
+        first, last = (math.inf if end is None else end for end in (low, high))
+        first = -first if low is None else first
+        inside = [k for k in range(len(column.categories)) if first < k <= last]
+        words = [MISSING] if column.missing == -1.0 and first < -1.0 else []
+        return " or ".join([*words, *(column.categories[k] for k in inside)])
+    ends = [end for end in (low, high) if end is not None]
+    words = [minute_word(column, end) for end in ends]
+    if not words or not all(words):
+        return ""
+    if low is None:
+        return f"{most} {words[0]}"
+    return f"> {' to '.join(words)}"
 
 
 def _date(days: Fraction) -> str:

@@ -11,7 +11,7 @@ from fuzzytree.report.audit_rows import Data, Passing
 from fuzzytree.report.audit_states import percent
 from fuzzytree.report.drawing import Axis
 from fuzzytree.report.markup import Markup
-from fuzzytree.report.models import curve_text, rule_text, sum_text, tree_lines
+from fuzzytree.report.models import rule_text, sum_text, term_text, tree_lines
 from fuzzytree.report.parts import MOST_LINES, MOST_RULES, part
 from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import MOST_LEAVES, tree_picture
@@ -79,11 +79,11 @@ def _cards(
     variables = {one.name: one for one in model.variables}
     for place, axis in enumerate(axes[:MOST_VARIABLES]):
         lines = [
-            f"{term.name}: {curve_text(term.function, model.inputs)}"
+            f"{term.name}: {term_text(variables[axis.name], term, model.inputs)}"
             for term in variables[axis.name].terms[:_MOST_TERMS]
         ]
         if axis.parts:
-            said = sum_text(axis.parts)
+            said = sum_text(axis.parts, variables)
             lines.append(f"{axis.name} = {said}")
         if axis.undrawn:
             lines.append(f"not drawn: {', '.join(axis.undrawn)}")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import date
 from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
 from fuzzytree.auditing import Domain
 from fuzzytree.model import (
+    DATE_UNIT,
     Document,
     Formula,
     Linear,
@@ -39,6 +41,7 @@ _MOST_WIDE = 900.0  # lines of words
 _STEPS = 72  # at which a curve is evaluated, beside its corners
 _CORNERS = 160  # of one curve that are drawn exactly
 _KEPT = 1024  # letters
+_FIRST_DAY = date(1970, 1, 1).toordinal()
 _NARROW = "fijlrtI.,:;'|!()[] -"
 _FLAT = 0.04  # points of a picture below what is visible
 _SQUARE = 256.0  # points of a side, in which a curve is thinned; a power of two
@@ -87,11 +90,32 @@ class Axis(NamedTuple):
     low: float | None
     high: float | None
     parts: tuple[Part, ...] = ()
+    categories: tuple[str, ...] = ()
 
     @property
     def title(self) -> str:
-        """The name with the unit."""
-        return f"{self.name} ({self.unit})" if self.unit else self.name
+        """The name with the unit, which of dates the ticks show."""
+        has_unit = self.unit and self.unit != DATE_UNIT
+        return f"{self.name} ({self.unit})" if has_unit else self.name
+
+    def ticks(self, x: Scale, most: int = 4) -> list[tuple[float, str]]:
+        """Return round values with their words: dates, categories if they fit."""
+        places = [(float(k), name) for k, name in enumerate(self.categories)]
+        wide = sum(text_width(name, LOOKS["small"][0]) + 12.0 for _, name in places)
+        if places and wide < abs(x.end - x.start):
+            return places
+        if self.unit == DATE_UNIT and (days := _round_days(x.low, x.high, most)):
+            dates = [str(date.fromordinal(_FIRST_DAY + int(day))) for day in days]
+            has_months = all(one.endswith("-01") for one in dates)
+            return [
+                *zip(days, [d[:-3] if has_months else d for d in dates], strict=True)
+            ]
+        values = ticks(x.low, x.high, most)
+        return [*zip(values, tick_words(values), strict=True)]
+
+
+NUMBERS = Axis("", "", (), (), None, None)
+"""What is no variable: an axis with numbers."""
 
 
 def axes_of(model: Document, domain: Domain) -> dict[str, Axis]:
@@ -132,7 +156,15 @@ def axis_of(variable: Variable | SystemOutput) -> Axis:
     ends = variable.low, variable.high
     if variable.categories:
         ends = 0.0, len(variable.categories) - 1.0
-    return Axis(variable.name, variable.unit, curves, others, *ends, variable.parts)
+    return Axis(
+        variable.name,
+        variable.unit,
+        curves,
+        others,
+        *ends,
+        variable.parts,
+        variable.categories,
+    )
 
 
 def term_curve(term: Term, values: Mapping[str, float] = MappingProxyType({})) -> Curve:
@@ -242,6 +274,26 @@ def ticks(low: float, high: float, most: int = 4) -> list[float]:
         if last - first < most:
             return [k * step for k in range(first, last + 1)] or [low]
     return [low]
+
+
+def _round_days(low: float, high: float, most: int) -> list[float]:
+    """Return firsts of months between two dates, in days, or else whole days."""
+    try:
+        first, last = (date.fromordinal(_FIRST_DAY + int(end)) for end in (low, high))
+    except (OverflowError, ValueError):
+        return []
+    begin, end = (12 * one.year + one.month - 1 for one in (first, last))
+    days: list[float] = []
+    for step in (1, 3, 6, *(12 * years for years in (1, 2, 5, 10, 20, 50, 100, 1000))):
+        months = (divmod(m, 12) for m in range(begin, end + 1) if m % step == 0)
+        firsts = (
+            date(year, month + 1, 1).toordinal() for year, month in months if year
+        )
+        days = [float(day - _FIRST_DAY) for day in firsts]
+        days = [day for day in days if low <= day <= high]
+        if len(days) <= most:
+            break
+    return days if len(days) > 1 else [t for t in ticks(low, high, most) if t % 1 == 0]
 
 
 def tick_words(values: Sequence[float]) -> list[str]:
@@ -394,11 +446,10 @@ class Sheet:
         return picture(self.marks, wide, high, self.heading, rules, about)
 
 
-def axis_marks(x: Scale, base: float) -> Iterator[Markup]:
-    """Yield the ticks of an axis with their numbers."""
-    values = ticks(x.low, x.high, 4)
+def axis_marks(x: Scale, base: float, axis: Axis = NUMBERS) -> Iterator[Markup]:
+    """Yield the ticks of an axis with their numbers, dates or categories."""
     previous = -math.inf
-    for value, word in zip(values, tick_words(values), strict=True):
+    for value, word in axis.ticks(x):
         at = x.at(value)
         half = text_width(word, LOOKS["small"][0]) / 2.0
         yield mark("line", at, at, base, base + 4, "tick")
@@ -408,18 +459,21 @@ def axis_marks(x: Scale, base: float) -> Iterator[Markup]:
             yield mark("words", left, base + 15, word, "small", "middle")
 
 
-def frame_marks(x: Scale, y: Scale, across: str, up: str) -> Iterator[Markup]:
-    """Yield a frame with the numbers and the names of both axes."""
+def frame_marks(
+    x: Scale, y: Scale, across: str | Axis, up: str | Axis
+) -> Iterator[Markup]:
+    """Yield a frame with the ticks and the names of both axes."""
+    names = [one if isinstance(one, str) else one.title for one in (across, up)]
+    lower, left = (NUMBERS if isinstance(one, str) else one for one in (across, up))
     wide, high = x.end - x.start, y.start - y.end
     yield mark("rect", x.start, y.end, wide, high, "axis")
-    yield from axis_marks(x, y.start)
-    values = ticks(y.low, y.high, 5)
-    for value, word in zip(values, tick_words(values), strict=True):
+    yield from axis_marks(x, y.start, lower)
+    for value, word in left.ticks(y, 5):
         yield mark("line", x.start - 4.0, x.start, y.at(value), y.at(value), "tick")
         yield mark("words", x.start - 8.0, y.at(value) + 4.0, word, "small", "end")
     middle = (x.start + x.end) / 2.0
-    yield from text_block(middle, y.start + 21.0, across, wide, "term", "middle")[0]
-    words, size = text_block(0.0, 0.0, up, high, "term", "middle")
+    yield from text_block(middle, y.start + 21.0, names[0], wide, "term", "middle")[0]
+    words, size = text_block(0.0, 0.0, names[1], high, "term", "middle")
     turn = f"translate({x.start - 52.0 - size:.1f} {(y.start + y.end) / 2.0:.1f})"
     yield mark("group", words, move=f"{turn} rotate(-90)")
 

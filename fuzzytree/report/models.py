@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
 
 import msgspec
 
 from fuzzytree.formats import conclusions_text, condition_sentence, text_of
 from fuzzytree.model import (
+    DATE_UNIT,
     LR,
     Activation,
     Band,
@@ -29,6 +33,7 @@ from fuzzytree.model import (
     Singleton,
     SystemOutput,
     SystemRule,
+    Term,
     Trapezoid,
     Variable,
     depth,
@@ -37,14 +42,16 @@ from fuzzytree.model import (
     sentence,
     stand_ins,
 )
-from fuzzytree.report.text import aligned, counted, number
+from fuzzytree.rechecking import MISSING, interval_word, minute_word
+from fuzzytree.report.text import aligned, counted, number, some
 from fuzzytree.runtimes import Facts, OnnxModel, Outputs
-from fuzzytree.semantics import Status, rules_of
+from fuzzytree.semantics import Status, curve_degree, rules_of
 
 Rules = Sequence[Rule | SystemRule]
 
 _MOST_PAIRS = 6  # points that a line of text shows one by one
 _MOST_PARTS = 12  # of a combination, where it must fit into a line
+_MOST_PLACES = 16  # categories that a line names
 
 
 def model_lines(model: Document) -> Iterator[str]:
@@ -192,18 +199,18 @@ def tree_lines(tree: Document) -> Iterator[str]:
     if not nodes:
         yield _leaf_text(1, leaves[0])
         return
-    parts = {v.name: len(v.parts) for v in tree.variables}
-    yield _node_text(nodes[0], parts)
+    variables = {v.name: v for v in tree.variables}
+    yield _node_text(nodes[0], variables)
     todo = _branches(nodes[0], "")
     while todo:
         node, position, indent = todo.pop()
         branch = node.branches[position]
         is_last = position == len(node.branches) - 1
         corner, rail = ("└─ ", "   ") if is_last else ("├─ ", "│  ")
-        text = f"{' or '.join(branch.terms)} ({taken(node, position)})"
+        text = branch_text(variables[node.variable], node, position)
         if branch.node is not None:
             below = nodes[branch.node - 1]
-            end = _node_text(below, parts)
+            end = _node_text(below, variables)
             todo += _branches(below, indent + rail)
         else:
             leaf = branch.leaf or 1
@@ -215,8 +222,8 @@ def _branches(node: Node, indent: str) -> list[tuple[Node, int, str]]:
     return [(node, k, indent) for k in reversed(range(len(node.branches)))]
 
 
-def _node_text(node: Node, parts: dict[str, int]) -> str:
-    count = parts[node.variable]
+def _node_text(node: Node, variables: Mapping[str, Variable]) -> str:
+    count = len(variables[node.variable].parts)
     return f"{node.variable}?" + (f"  ({count} inputs)" if count else "")
 
 
@@ -231,19 +238,53 @@ def _rows_text(part: Leaf | Rule | SystemRule) -> str:
     return "" if support is None else f"  {counted(support, 'row')}"
 
 
-def taken(node: Node, position: int, most: str = "<=") -> str:
-    """Return the values that a branch takes, such as `<= 2.5` or `1 to 2`."""
-    values: list[str] = []
+def branch_text(
+    variable: Variable,
+    node: Node,
+    position: int,
+    form: str = "{} ({})",
+    most: str = "<=",
+) -> str:
+    """Return the terms of a branch, and the values that it takes if they do not say so.
+
+    Numbers are taken as `<= 2.5` or `> 1 to 2`, dates alike; of categories their names.
+    """
+    terms, values = " or ".join(node.branches[position].terms), list[str]()
     for (low, high), owner in zip(intervals(node), node.owners, strict=True):
         if owner != position:
             continue
-        if low is None:
+        if word := interval_word(variable, low, high, most):
+            values.append(word)
+        elif low is None:
             values.append(f"{most} {number(high)}" if high is not None else "any")
         elif high is None:
             values.append(f"> {number(low)}")
         else:
             values.append(f"> {number(low)} to {number(high)}")
-    return " or ".join(values)
+    shown = " or ".join(values)
+    is_clear = variable.categories and re.sub(r" \(\d+\)", "", terms) == shown
+    return terms if is_clear else form.format(terms, shown)
+
+
+def value_word(variable: Variable, value: float) -> str:
+    """Return a value of an input with its unit, its category, or its date.
+
+    Example:
+        >>> value_word(Variable("mass", unit="kg"), 2.0)
+        '2 kg'
+        >>> value_word(Variable("day", unit=DATE_UNIT), 19783.0)
+        '2024-03-01'
+    """
+    word = minute_word(variable, value)
+    return word or f"{number(value)} {variable.unit}".rstrip()
+
+
+def end_word(variable: Variable | SystemOutput, value: float) -> str:
+    """Return a value without its unit; a date if it is one."""
+    word = ""
+    if isinstance(variable, Variable) and variable.unit == DATE_UNIT:
+        word = minute_word(variable, value)
+    return word or number(value)
 
 
 def term_lines(
@@ -253,13 +294,15 @@ def term_lines(
 
     `columns` are the inputs of a fuzzy system, which linear terms multiply.
     """
+    known = {one.name: one for one in variables if isinstance(one, Variable)}
     for one in variables:
         if isinstance(one, Variable) and not (one.terms or one.parts):
             continue
         yield one.name + _span_text(one)
-        for position, line in enumerate(summands(one.parts)):
+        for position, line in enumerate(summands(one.parts, known)):
             lead = f"  {line}" if position else f"= {line.replace('+', ' ', 1)}"
             yield f"  {lead}"
+        yield from (f"    {line}" for line in places_of(one.parts, known))
         if isinstance(one, SystemOutput):
             yield f"  {_answer_text(one)}"
         heights = [
@@ -267,21 +310,50 @@ def term_lines(
             for term in one.terms
         ]
         yield from aligned(
-            (f"  {term.name}", f"{curve_text(term.function, columns)}{times}")
+            (f"  {term.name}", f"{term_text(one, term, columns)}{times}")
             for term, times in zip(one.terms, heights, strict=True)
         )
 
 
+def places_of(parts: Sequence[Part], known: Mapping[str, Variable]) -> Iterator[str]:
+    """Yield what a combination counts categories as, an input to a line."""
+    for part in parts:
+        names = enumerate(known[part.input].categories)
+        if places := [f"{place} is {name}" for place, name in names]:
+            yield f"{part.input}: {some(places, _MOST_PLACES)}"
+
+
+def term_text(one: Variable | SystemOutput, term: Term, columns: Sequence[str]) -> str:
+    """Return what a term is: of categories the degree of each, else its curve."""
+    if isinstance(one, SystemOutput) or not one.categories:
+        return curve_text(term.function, columns, partial(end_word, one))
+    by_degree: dict[float, list[str]] = {}
+    names = [*enumerate(one.categories)]
+    names += [(-1, MISSING)] if one.missing == -1.0 else []
+    for place, name in names:
+        by_degree.setdefault(curve_degree(term.function, place), []).append(name)
+    by_degree.pop(0.0, None)
+    levels = sorted(by_degree.items(), reverse=True)
+    return (
+        "; ".join(f"{number(d)}: {some(names, _MOST_PLACES)}" for d, names in levels)
+        or "0"
+    )
+
+
 def _span_text(one: Variable | SystemOutput) -> str:
     """Return the unit and the range of a variable, to stand behind its name."""
-    unit = f", in {one.unit}" if one.unit else ""
+    unit = f", in {one.unit}" if one.unit and one.unit != DATE_UNIT else ""
+    if isinstance(one, Variable) and one.categories:
+        return f"{unit}, {counted(len(one.categories), 'category', 'categories')}"
     if one.low is None or one.high is None:
         return unit
     clipped = ", clipped" if one.clips else ""
-    return f"{unit}, {number(one.low)} to {number(one.high)}{clipped}"
+    return f"{unit}, {end_word(one, one.low)} to {end_word(one, one.high)}{clipped}"
 
 
-def sum_text(parts: Sequence[Part]) -> str:
+def sum_text(
+    parts: Sequence[Part], known: Mapping[str, Variable] = MappingProxyType({})
+) -> str:
     """Return the first summands of a combination of columns in a line.
 
     Example:
@@ -290,14 +362,22 @@ def sum_text(parts: Sequence[Part]) -> str:
     """
     more = len(parts) - _MOST_PARTS
     rest = [f"+ {counted(more, 'more input')}"] if more > 0 else []
-    return " ".join([*summands(parts[:_MOST_PARTS]), *rest]).removeprefix("+ ")
+    return " ".join([*summands(parts[:_MOST_PARTS], known), *rest]).removeprefix("+ ")
 
 
-def summands(parts: Sequence[Part]) -> Iterator[str]:
-    """Yield each summand of a combination with its sign, the first with `+` too."""
+def summands(
+    parts: Sequence[Part], known: Mapping[str, Variable] = MappingProxyType({})
+) -> Iterator[str]:
+    """Yield each summand of a combination with its sign, the first with `+` too.
+
+    `known` are the inputs, of which those of dates have a date subtracted.
+    """
     for part in parts:
-        centre = "-" if part.centre >= 0 else "+"
-        shifted = f"({part.input} {centre} {number(abs(part.centre))})"
+        is_date = part.input in known and known[part.input].unit == DATE_UNIT
+        minus = "-" if part.centre >= 0 or is_date else "+"
+        centre = number(abs(part.centre))
+        centre = end_word(known[part.input], part.centre) if is_date else centre
+        shifted = f"({part.input} {minus} {centre})"
         inner = shifted if part.centre else part.input
         yield f"{'-' if part.weight < 0 else '+'} {number(abs(part.weight))} * {inner}"
 
@@ -398,8 +478,12 @@ def _samples_text(one: SystemOutput) -> str:
     return f"{text} and at its singletons" if single else text
 
 
-def curve_text(curve: Curve, columns: Sequence[str] = ()) -> str:
-    """Return a curve in words and numbers.
+def curve_text(
+    curve: Curve,
+    columns: Sequence[str] = (),
+    word: Callable[[float], str] = number,
+) -> str:
+    """Return a curve in words and numbers; `word` writes values of its variable.
 
     Example:
         >>> curve_text(Trapezoid(0.0, 1.0, 1.0, 3.0))
@@ -412,16 +496,16 @@ def curve_text(curve: Curve, columns: Sequence[str] = ()) -> str:
     """
     match curve:
         case Band(low=low, high=high, left=left, right=right):
-            return _plateau_text(low, high, left, right, "above")
+            return _plateau_text(low, high, left, right, "above", word)
         case Trapezoid(a=a, b=b, c=c, d=d):
             low, high = None if a is None else b, None if d is None else c
-            return _plateau_text(low, high, a, d, "from")
+            return _plateau_text(low, high, a, d, "from", word)
         case LR(mean=mean, left=below, right=above):
             apart = "" if below == above else f" below, {_side_text(above)} above"
-            return f"1 at {number(mean)}, spread {_side_text(below)}{apart}"
+            return f"1 at {word(mean)}, spread {_side_text(below)}{apart}"
         case Points(values=values, degrees=degrees):
             pairs = [
-                f"({number(v)}, {number(d)})"
+                f"({word(v)}, {number(d)})"
                 for v, d in zip(values, degrees, strict=True)
             ]
             if len(pairs) > _MOST_PAIRS:
@@ -457,25 +541,28 @@ def _plateau_text(
     left: float | None,
     right: float | None,
     since: str,
+    word: Callable[[float], str],
 ) -> str:
     """Return where a curve is 1, and where it rises and falls beside that."""
     if low is None:
-        edge = "1 everywhere" if high is None else f"1 up to {number(high)}"
+        edge = "1 everywhere" if high is None else f"1 up to {word(high)}"
     elif high is None:
-        edge = f"1 {since} {number(low)}"
+        edge = f"1 {since} {word(low)}"
     elif low == high:
-        edge = f"1 at {number(low)}"
+        edge = f"1 at {word(low)}"
     else:
-        edge = f"1 from {number(low)} to {number(high)}"
-    rises = "" if low is None else _flank_text(low, left, "rises from")
-    falls = "" if high is None else _flank_text(high, right, "falls to")
+        edge = f"1 from {word(low)} to {word(high)}"
+    rises = "" if low is None else _flank_text(low, left, "rises from", word)
+    falls = "" if high is None else _flank_text(high, right, "falls to", word)
     return ", ".join(filter(None, (edge, rises, falls)))
 
 
-def _flank_text(edge: float, end: float | None, verb: str) -> str:
+def _flank_text(
+    edge: float, end: float | None, verb: str, word: Callable[[float], str]
+) -> str:
     if end is None:
-        return f"0 beyond {number(edge)}"
-    return f"{verb} 0 at {number(end)}"
+        return f"0 beyond {word(edge)}"
+    return f"{verb} 0 at {word(end)}"
 
 
 def _side_text(side: Side) -> str:

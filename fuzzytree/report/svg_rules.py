@@ -7,16 +7,12 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
-
 from fuzzytree.model import (
-    DATE_UNIT,
     Document,
     Proposition,
     Rule,
     SystemOutput,
     SystemRule,
-    Variable,
     questions,
 )
 from fuzzytree.report.drawing import (
@@ -35,7 +31,7 @@ from fuzzytree.report.drawing import (
     text_block,
 )
 from fuzzytree.report.markup import mark
-from fuzzytree.report.models import Rules, rule_text
+from fuzzytree.report.models import Rules, rule_text, value_word
 from fuzzytree.report.pictures import Picture, class_mark
 from fuzzytree.report.svg_terms import scale_of, sum_words
 from fuzzytree.report.text import number
@@ -52,7 +48,6 @@ MOST_RULES = 100
 """Of a picture."""
 
 _NUMBER, _CELL, _GAP, _END = 34.0, 132.0, 16.0, 104.0  # wide: from left to right
-_MOST_DAYS = 1e6  # from 1970, that a date has
 _COLUMNS = 7  # at most, of variables; more are named in cells
 _PLOT, _ROW = 30.0, 10.0  # high: curves, and between rows
 _ABOUT = "A row for each rule, a cell for each proposition: curve, value and degree. "
@@ -97,7 +92,7 @@ def draw_rules(
     sheet.words(verdict, "words")
     sheet.words(listing([f"{name} = {scene.word(name)}" for name in base.inputs]))
     for column in scene.columns:
-        sheet.words(sum_words(column))
+        sheet.words(sum_words(column, model.variables))
     heads = [f"{column.name} = {scene.word(column.name)}" for column in scene.columns]
     heads = [*(heads if scene.is_table else [""] * scene.width)]
     heads += [output.name for output in base.outputs]
@@ -162,22 +157,6 @@ def _strength(
 
 def _short(value: float) -> str:
     return f"{value:.3g}"
-
-
-def value_word(variable: Variable, value: float) -> str:
-    """Return a value of an input with its unit, its category, or its day.
-
-    Example:
-        >>> value_word(Variable("mass", unit="kg"), 2.0)
-        '2 kg'
-        >>> value_word(Variable("day", unit=DATE_UNIT), 19783.0)
-        '2024-03-01'
-    """
-    if variable.unit == DATE_UNIT and value.is_integer() and abs(value) < _MOST_DAYS:
-        return str(np.datetime64(int(value), "D"))
-    if variable.categories and value in range(len(variable.categories)):
-        return variable.categories[int(value)]
-    return f"{number(value)} {variable.unit}".rstrip()
 
 
 class _Scene:

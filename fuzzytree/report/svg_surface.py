@@ -23,8 +23,9 @@ from fuzzytree.report.drawing import (
     ticks,
 )
 from fuzzytree.report.markup import Markup, mark
+from fuzzytree.report.models import value_word
 from fuzzytree.report.pictures import Picture, class_mark
-from fuzzytree.report.svg_rules import draw_rules, value_word
+from fuzzytree.report.svg_rules import draw_rules
 from fuzzytree.report.svg_terms import draw_terms, scale_of
 from fuzzytree.report.svg_tree import draw_tree
 from fuzzytree.runtimes import Predictions, answers_of, baseline
@@ -166,8 +167,8 @@ def draw_surface(
         across, up = surface.x.at(row[names[0]]), surface.y.at(row[names[1]])
         diamond = f"M{across:.1f} {up - 6:.1f}l6 6l-6 6l-6 -6z"
         point = [mark("path", diamond, "witness")]
-    titles = [axis_of(variables[name]).title for name in names]
-    frame = [*frame_marks(surface.x, surface.y, *titles), *point]
+    axes = [axis_of(variables[name]) for name in names]
+    frame = [*frame_marks(surface.x, surface.y, *axes), *point]
     blocks = [([*_cells(surface, name), *frame], 0.0) for name in surface.panels]
     sheet.row(blocks, step)
     sheet.top += _TOP + _SIDE + _BELOW

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from fuzzytree.auditing import Span
 from fuzzytree.model import Document, SystemOutput, Variable, printable
+from fuzzytree.rechecking import table_word
 from fuzzytree.report.audit_rows import Data, histogram
 from fuzzytree.report.drawing import (
     Axis,
@@ -26,7 +27,7 @@ from fuzzytree.report.drawing import (
     text_width,
 )
 from fuzzytree.report.markup import Markup, mark
-from fuzzytree.report.models import summands
+from fuzzytree.report.models import places_of, summands
 from fuzzytree.report.pictures import Picture, class_mark
 from fuzzytree.report.text import number
 
@@ -101,14 +102,15 @@ def terms_picture(
         marks.append(mark("line", at, at, top - 4, y.start, "pin"))
         diamond = f"M{at:.1f} {y.start - 5.5:.1f}l5.5 5.5l-5.5 5.5l-5.5 -5.5z"
         marks.append(mark("path", diamond, "witness"))
-    marks += axis_marks(x, y.start)
+    marks += axis_marks(x, y.start, axis)
     rest = len(axis.curves) - len(curves)
     notes += [f"{rest} not drawn"] if rest else []
     words, high = text_block(_LEFT, y.start + 22.0, notes, WIDE - 2 * _LEFT)
     terms = ", ".join(curve.name for curve in curves) or "none"
     domain = ""
     if axis.low is not None and axis.high is not None:
-        domain = f"; the domain is {number(axis.low)} to {number(axis.high)}"
+        ends = [table_word(axis, v) or number(v) for v in (axis.low, axis.high)]
+        domain = f"; the domain is {ends[0]} to {ends[1]}"
     about = f"Degrees from 0 to 1 over the values{domain}; terms: {terms}"
     title, high = f"The terms of {axis.title}", y.start + 22.0 + high
     return mark("svg", WIDE, high, name, title, about, [*marks, *words]), high
@@ -121,7 +123,11 @@ def draw_terms(model: Document, *, title: str | None = None) -> Picture:
     names below.
     """
     variables: list[Variable | SystemOutput] = [*model.variables, *model.outputs]
-    cards = [_card(one, f"v{k}") for k, one in enumerate(variables) if one.terms]
+    cards = [
+        _card(one, f"v{k}", model.variables)
+        for k, one in enumerate(variables)
+        if one.terms
+    ]
     if not cards:
         raise ValueError(f"{model.name} has no terms that are curves")
     step = WIDE + 2 * _GAP
@@ -132,14 +138,16 @@ def draw_terms(model: Document, *, title: str | None = None) -> Picture:
     return sheet.picture("A curve for each term: degrees from 0 to 1 over the values")
 
 
-def _card(variable: Variable | SystemOutput, name: str) -> Block:
+def _card(
+    variable: Variable | SystemOutput, name: str, known: Sequence[Variable]
+) -> Block:
     """Return the terms of a variable under its name, and what these do not show."""
     axis = axis_of(variable)
     categories = [
         f"{place} is {text}" for place, text in enumerate(variable.categories)
     ]
     undrawn = f"not drawn: {', '.join(axis.undrawn)}" if axis.undrawn else ""
-    notes = [", ".join(categories), undrawn, sum_words(variable)]
+    notes = [", ".join(categories), undrawn, sum_words(variable, known)]
     marks, top = text_block(0.0, _GAP, axis.title, WIDE, "strong")
     top += _GAP
     for note in notes:
@@ -152,12 +160,16 @@ def _card(variable: Variable | SystemOutput, name: str) -> Block:
     return marks, top + _GAP
 
 
-def sum_words(variable: Variable | SystemOutput) -> list[str]:
+def sum_words(
+    variable: Variable | SystemOutput, variables: Iterable[Variable]
+) -> list[str]:
     """Return what a combination is, in words that stay together; none of an input."""
     if not variable.parts:
         return []
-    first, *others = summands(variable.parts)
-    return [f"{variable.name} = {first.removeprefix('+ ')}", *others]
+    known = {one.name: one for one in variables}
+    first, *others = summands(variable.parts, known)
+    places = [f"({line})" for line in places_of(variable.parts, known)]
+    return [f"{variable.name} = {first.removeprefix('+ ')}", *others, *places]
 
 
 def _curves(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from fuzzytree.model import Document, Node
+from fuzzytree.model import Document
 from fuzzytree.report.audit_rows import Counts, Passing
 from fuzzytree.report.drawing import (
     EDGE,
@@ -18,7 +18,7 @@ from fuzzytree.report.drawing import (
     text_width,
 )
 from fuzzytree.report.markup import Markup, mark
-from fuzzytree.report.models import taken
+from fuzzytree.report.models import branch_text
 from fuzzytree.report.pictures import Picture, class_mark
 from fuzzytree.report.svg_terms import sum_words
 from fuzzytree.report.text import counted
@@ -108,7 +108,7 @@ def draw_tree(tree: Document, *, title: str | None = None) -> Picture:
     names = {node.variable for node in tree.nodes}
     for variable in tree.variables:
         if variable.name in names:
-            sheet.words(sum_words(variable))
+            sheet.words(sum_words(variable, tree.variables))
     return sheet.picture(_ABOUT)
 
 
@@ -135,7 +135,7 @@ def _tree_marks(boxes: Sequence[Box]) -> tuple[list[Markup], float, float]:
 def boxes_of(tree: Document, rows: Passing | None) -> list[Box]:
     """Return all nodes and leaves, depth first; `arrange` puts them in their places."""
     codes = {label: code for code, label in enumerate(tree.classes)}
-    categorical = {one.name for one in tree.variables if one.categories}
+    known = {one.name: one for one in tree.variables}
     boxes: list[Box] = []
     todo: list[tuple[int | None, int | None, str, Box | None]]
     todo = [(1, None, "", None) if tree.nodes else (None, 1, "", None)]
@@ -146,10 +146,10 @@ def boxes_of(tree: Document, rows: Passing | None) -> list[Box]:
             tested = tree.nodes[node - 1]
             box = Box(level, f"{tested.variable}?", "", branch)
             box.counts = rows.nodes[node - 1] if rows else ()
-            todo += [
-                (way.node, way.leaf, _branch_words(tested, place, categorical), box)
-                for place, way in reversed([*enumerate(tested.branches)])
-            ]
+            of = known[tested.variable]
+            for place, way in reversed([*enumerate(tested.branches)]):
+                words = branch_text(of, tested, place, "{}: {}", "≤")
+                todo.append((way.node, way.leaf, words, box))
         else:
             position = leaf or 1
             end = tree.leaves[position - 1]
@@ -186,13 +186,6 @@ def _classes_text(counts: Counts, classes: Sequence[str]) -> str:
     rest = sum(counts[k] for k in order[_MOST_CLASSES:])
     more = [f"{rest} of other classes"] if rest else []
     return f": {', '.join([*shown[:_MOST_CLASSES], *more])}"
-
-
-def _branch_words(node: Node, place: int, categorical: Collection[str]) -> str:
-    """Return the terms of a branch, with its values where they are numbers."""
-    terms = " or ".join(node.branches[place].terms)
-    is_number = node.variable not in categorical
-    return f"{terms}: {taken(node, place, '≤')}" if is_number else terms
 
 
 def arrange(boxes: Sequence[Box]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import datetime
 import io
 import math
 from collections.abc import Callable, Collection, Mapping
@@ -24,12 +23,8 @@ from fuzzytree.auditing.decide import (
 )
 from fuzzytree.auditing.decide.domain import Domain
 from fuzzytree.auditing.require.claims import Verdict
-from fuzzytree.model import (
-    DATE_UNIT,
-    Document,
-    FloatArray,
-    Variable,
-)
+from fuzzytree.model import Document, FloatArray, Variable
+from fuzzytree.rechecking import table_word
 from fuzzytree.runtimes import baseline
 
 _NEAR = 1024  # rows drawn near the worst of them
@@ -213,10 +208,7 @@ def rows_text(model: Document, rows: Rows) -> str:
 
 def _cell_text(variable: Variable, value: float) -> str:
     """Return a value of an input as a table has it."""
-    if variable.categories:
-        is_code = value in range(len(variable.categories))
-        return variable.categories[int(value)] if is_code else ""
-    if variable.unit == DATE_UNIT and value.is_integer():
-        start = datetime.date(1970, 1, 1)
-        return (start + datetime.timedelta(days=value)).isoformat()
-    return repr(value).removesuffix(".0")
+    if variable.categories or value.is_integer():
+        word = table_word(variable, value)
+        return word if word or variable.categories else repr(value).removesuffix(".0")
+    return repr(value)
