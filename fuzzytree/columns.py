@@ -67,6 +67,8 @@ class Contents(msgspec.Struct, frozen=True):
         other: How many are nothing of the kind.
         texts: The different texts, sorted; None if they are more than
             `MOST_CATEGORIES`.
+        order: All categories in the order that the type of the column states; empty
+            if parts of the column differ in it.
     """
 
     number: int = 0
@@ -75,6 +77,12 @@ class Contents(msgspec.Struct, frozen=True):
     text: int = 0
     other: int = 0
     texts: tuple[str, ...] | None = ()
+    order: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether the type of the column states an order of all its texts."""
+        return bool(self.order) and {*(self.texts or ())} <= {*(self.order or ())}
 
     @property
     def cells(self) -> int:
@@ -88,6 +96,9 @@ class Contents(msgspec.Struct, frozen=True):
             texts = None
         elif not {*other.texts} <= {*texts}:
             texts = _bounded({*texts, *other.texts})
+        order = self.order if self.cells else other.order
+        if self.cells and other.cells and self.order != other.order:
+            order = ()
         return Contents(
             self.number + other.number,
             self.boolean + other.boolean,
@@ -95,6 +106,7 @@ class Contents(msgspec.Struct, frozen=True):
             self.text + other.text,
             self.other + other.other,
             texts,
+            order,
         )
 
     def kind(self, *, is_categorical: bool = False) -> Kind | None:
@@ -172,7 +184,9 @@ def coded(
         counts[kind] = sum(of_value[k] for k in chosen)
         if counts[kind]:
             first[kind] = int(np.isin(indices, chosen).argmax())
-    contents = Contents(**counts, texts=_bounded({*texts.values()}))
+    contents = Contents(
+        **counts, texts=_bounded({*texts.values()}), order=msgspec.UNSET
+    )
     return numbers[indices], contents, first
 
 
@@ -185,7 +199,7 @@ def _plain(
     if count < len(values):
         values = np.where(is_none, math.nan, values)
     first = {kind: int((~is_none).argmax())} if count else {}
-    return values, Contents(**{kind: count}, texts=()), first
+    return values, Contents(**{kind: count}, texts=(), order=msgspec.UNSET), first
 
 
 def _read(value: object, *, is_categorical: bool) -> tuple[str, float | str]:

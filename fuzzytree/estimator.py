@@ -89,13 +89,14 @@ def _frame_of(X: Any) -> nw.DataFrame[Any] | None:
 
 def _as_numbers(
     frame: nw.DataFrame[Any],
-) -> tuple[FloatArray, dict[str, tuple[str, ...]], list[str]]:
+) -> tuple[FloatArray, dict[str, tuple[str, ...]], list[str], list[str]]:
     """Return a frame to learn from as numbers, shape (rows, columns).
 
     A column that is left out is 0.
 
     Returns:
-        The numbers, the categories by column, and the columns of dates.
+        The numbers, the categories by column, the columns of dates, and those whose
+        categories have an order.
     """
     table = read_table(frame.to_native(), target=np.zeros(len(frame)), name="X")
     for column, text in table.remarks:
@@ -104,7 +105,10 @@ def _as_numbers(
     values = np.zeros((len(titles), len(frame)))
     values[[[*titles].index(name) for name in table.columns]] = table.values
     categories = {titles[name]: texts for name, texts in table.categories.items()}
-    return values.T, categories, [titles[name] for name in table.dates]
+    dates, ordered = (
+        [titles[name] for name in names] for names in (table.dates, table.ordered)
+    )
+    return values.T, categories, dates, ordered
 
 
 def _with_hints(construct: Callable[P, None]) -> Callable[P, None]:
@@ -277,19 +281,21 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 weights = weights[kept]
         categories: dict[str, tuple[str, ...]] = {}
         dates: list[str] = []
+        ordered: list[str] = []
         frame = _frame_of(rows[0])
         if frame is None:
             values, labels = _validated(self, *rows, **self._numeric())
         else:
             _validated(self, *rows, skip_check_array=True)
-            table, categories, dates = _as_numbers(self._with_own_names(frame))
+            found = _as_numbers(self._with_own_names(frame))
+            table, categories, dates, ordered = found
             values, labels = check_X_y(table, rows[1], **self._numeric())
         check_classification_targets(labels)
         if len(values) == 1:
             raise ValueError("cannot learn from one sample (n_samples = 1)")
         classes, codes = np.unique(labels, return_inverse=True)
         refuse_measurements("y", "", [*map(str, classes)], codes)
-        self._start(classes, categories, dates)
+        self._start(classes, categories, dates, ordered)
         return self._learn(values, labels, weights)
 
     def partial_fit(
@@ -365,6 +371,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         classes: LabelArray,
         categories: Mapping[str, tuple[str, ...]] | None = None,
         dates: Sequence[str] = (),
+        ordered: Sequence[str] = (),
     ) -> None:
         self.classes_ = classes
         names = [str(label) for label in classes]
@@ -379,6 +386,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             dict.fromkeys(dates, DATE_UNIT),
             settings=LearningSettings(**chosen),
             categories=categories or {},
+            ordered=ordered,
         )
 
     def _learn(

@@ -166,7 +166,8 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
         whole: All cells as one array of shape (columns, rows), where they are one.
         frame: The rows as a table of pyarrow, of a Parquet or Arrow file.
         share: How much of the bytes of all files was read by then; 0 if unknown.
-        texts: The columns whose type says that they hold texts or categories.
+        texts: The columns whose type says that they hold texts or categories, with
+            these in their order if it states one.
     """
 
     name: str
@@ -179,7 +180,7 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
     whole: FloatArray | None = None
     frame: object = None
     share: float = 0.0
-    texts: Sequence[str] = ()
+    texts: Mapping[str, tuple[str, ...]] = {}
 
 
 class Table(msgspec.Struct, frozen=True, eq=False):
@@ -204,6 +205,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
             positions among these.
         dates: The columns of dates; their values are days since 1970-01-01 (UTC).
         is_categorical: Whether the target was said to have categories.
+        ordered: The columns whose categories have an order, which is theirs here.
     """
 
     name: str
@@ -222,6 +224,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
     categories: Mapping[str, tuple[str, ...]] = {}
     dates: tuple[str, ...] = ()
     is_categorical: bool = False
+    ordered: tuple[str, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -577,6 +580,7 @@ class LearningRows:
             categories=columns.categories,
             dates=columns.dates,
             is_categorical=self.target in self.categorical,
+            ordered=columns.ordered,
         )
 
     def _chosen(self, first: TablePiece) -> list[int]:
@@ -771,7 +775,7 @@ def _with_plain_numbers(
     Raises:
         TableError: If a column that is not categorical has another number.
     """
-    cells, typed = [*piece.cells], {*piece.texts}
+    cells, typed = [*piece.cells], {**piece.texts}
     for place, (name, column) in enumerate(zip(piece.columns, cells, strict=True)):
         if isinstance(column, np.ndarray) and column.dtype.kind in REAL:
             continue
@@ -790,12 +794,12 @@ def _with_plain_numbers(
         for k in others:
             texts[k] = values[k]
         cells[place] = [texts[k] for k in indices]
-        typed.discard(name)
+        typed.pop(name, None)
         if hasattr(column, "chunks"):
             import pyarrow as pa
 
             cells[place] = pa.chunked_array([cells[place]], pa.string())
-    return msgspec.structs.replace(piece, cells=(*cells,), texts=[*typed])
+    return msgspec.structs.replace(piece, cells=(*cells,), texts=typed)
 
 
 def class_names(cells: Sequence[Cells]) -> list[str | None]:
@@ -923,6 +927,7 @@ class LearntColumns(msgspec.Struct, frozen=True):
         categories: Those of columns of text or truth values, by name.
         dates: The columns of dates.
         remarks: Columns that are left out, and why.
+        ordered: The columns of categories whose type states their order.
     """
 
     names: tuple[str, ...]
@@ -930,6 +935,7 @@ class LearntColumns(msgspec.Struct, frozen=True):
     categories: Mapping[str, tuple[str, ...]]
     dates: tuple[str, ...]
     remarks: tuple[tuple[str, str], ...]
+    ordered: tuple[str, ...] = ()
 
     def placed(self, values: FloatArray) -> FloatArray:
         """Return the values of the columns, with positions in the place of codes.
@@ -973,6 +979,7 @@ def columns_of(
     remarks: list[tuple[str, str]] = []
     categories: dict[str, tuple[str, ...]] = {}
     dates: list[str] = []
+    ordered: list[str] = []
     for place, name in enumerate(names):
         held = contents.get(name, Contents())
         is_declared = name in categorical
@@ -999,6 +1006,9 @@ def columns_of(
                 hint += ", or convert it to numbers"
             remarks.append((name, f"{text}; it is left out{hint}"))
             continue
+        elif kind == "text" and held.is_ordered:
+            categories[name] = held.order or ()
+            ordered.append(name)
         elif kind in ("text", "boolean"):
             numbers = np.unique(values[place]) if held.number else ()
             categories[name] = categories_of(held, [*map(float, numbers)])
@@ -1018,7 +1028,8 @@ def columns_of(
     if not chosen:
         lines = [f"\n  {name}: {text}" for name, text in remarks[:_MOST_NAMES]]
         raise TableError(f"{table} has no column to learn from{''.join(lines)}")
-    return LearntColumns(chosen, tuple(kept), categories, tuple(dates), tuple(remarks))
+    others = tuple(dates), tuple(remarks), tuple(ordered)
+    return LearntColumns(chosen, tuple(kept), categories, *others)
 
 
 def _mixed_text(
@@ -1083,6 +1094,8 @@ def _codes_of(
             column = _quoted(name)
             hint = f"; pass --ignore {column}, or --categorical {column} to learn text"
             _refuse_rounded(piece, name, cells, values[row], hint)
+        if order := piece.texts.get(name):
+            contents = msgspec.structs.replace(contents, order=order)
         examples = {kind: (place, str(cells[place])) for kind, place in first.items()}
         found.append((contents, examples))
     return values, found
@@ -1548,7 +1561,7 @@ def _batch_pieces(
         titles = written or tuple(table.column_names)
         columns = _named(name, titles)
         cells: list[Cells] = [()] * len(columns)
-        texts: list[str] = []
+        texts: dict[str, tuple[str, ...]] = {}
         places = {title: place for place, title in enumerate(titles)}
         for title, data in zip(table.column_names, table.columns, strict=True):
             place = places[title]
@@ -1557,12 +1570,23 @@ def _batch_pieces(
                 is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
                 cells[place] = number_array(data) if is_number else data.to_pylist()
                 if str(kind).startswith(("string", "large_string", "dictionary")):
-                    texts.append(columns[place])
+                    texts[columns[place]] = _order_of(data)
         where, count = _row_names(name, first), table.num_rows
         yield TablePiece(
             name, columns, (*cells,), count, where, titles, frame=table, texts=texts
         )
         first += count
+
+
+def _order_of(column: object) -> tuple[str, ...]:
+    """Return the categories of a column of pandas or pyarrow that orders them."""
+    kind: object = getattr(column, "dtype", getattr(column, "type", None))
+    if not getattr(kind, "ordered", False):
+        return ()
+    names: Iterable[object] = getattr(kind, "categories", ())
+    for chunk in getattr(column, "chunks", ())[:1]:
+        names = chunk.dictionary.to_pylist()
+    return tuple(map(text_of, names))
 
 
 def _record_batches(
@@ -1770,7 +1794,7 @@ def _frame_piece(source: object, name: str, only: Only = None) -> TablePiece:
     columns = _named(name, written)
     there = dict(zip(map(str, frame.columns), frame.columns, strict=True))
     cells: list[Cells] = []
-    texts: list[str] = []
+    texts: dict[str, tuple[str, ...]] = {}
     for title, column in zip(written, columns, strict=True):
         if title not in there or not (only is None or column in only):
             cells.append(())
@@ -1783,7 +1807,7 @@ def _frame_piece(source: object, name: str, only: Only = None) -> TablePiece:
         cells.append(series.to_numpy() if is_array else series.to_list())
         is_text = isinstance(kind, nw.String | nw.Categorical | nw.Enum)
         if is_text and str(getattr(series.to_native(), "dtype", "")) != "object":
-            texts.append(column)
+            texts[column] = _order_of(series.to_native())
     where = _row_names(name)
     return TablePiece(name, columns, (*cells,), len(frame), where, written, texts=texts)
 

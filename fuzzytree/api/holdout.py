@@ -210,6 +210,7 @@ def accuracy(
             classes=classes,
             settings=_of_fold(settings, classes),
             categories=table.categories,
+            ordered=table.ordered,
             weights=None if table.row_weights is None else table.row_weights[kept],
         )
         values, rules, right = _predicted(table, learnt.tree, test)
@@ -323,6 +324,7 @@ def front(table: Table, settings: LearningSettings) -> Front | None:
         classes=table.classes,
         settings=settings,
         categories=table.categories,
+        ordered=table.ordered,
     )
     learner.partial_fit(table.values.T, table.codes, weights=table.row_weights)
     return learner.front()

@@ -208,6 +208,7 @@ def learn_table(
         name=name,
         settings=settings,
         categories=table.categories,
+        ordered=table.ordered,
         weights=table.row_weights,
         progress=progress,
     )

@@ -309,7 +309,13 @@ class Learner:
                 )
         units = {**self.units, **dict.fromkeys(found.dates, DATE_UNIT)}
         learner = ArrayLearner(
-            found.names, order, units, self.name, self.settings, found.categories
+            found.names,
+            order,
+            units,
+            self.name,
+            self.settings,
+            found.categories,
+            found.ordered,
         )
         learner.statistics = statistics.of_columns(found.kept)
         learnt = learner.finish(progress=progress)
@@ -345,6 +351,7 @@ class Learner:
             categories=columns.categories,
             dates=columns.dates,
             is_categorical=self.target in self.categorical,
+            ordered=columns.ordered,
         )
 
     def _learnt_columns(self, statistics: Statistics) -> LearntColumns:

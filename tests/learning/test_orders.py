@@ -1,11 +1,15 @@
 """Categories in combinations: their order, and who may enter."""
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pytest
 
-from fuzzytree import FuzzyTreeClassifier
+import fuzzytree as ft
+from fuzzytree import FuzzyTreeClassifier, Learner
 from fuzzytree.api.holdout import accuracy
 from fuzzytree.learning import LearningSettings
 from fuzzytree.learning.orders import category_orders
@@ -130,3 +134,61 @@ def test_folds_predict_categories_in_the_order_of_each_tree() -> None:
     found = accuracy(read_table(frame, target=labels), LearningSettings())
     assert found is not None
     assert found.mean == 1.0
+
+
+def sizes() -> tuple[pd.DataFrame, np.ndarray]:
+    """Return rows whose class depends on the order of their size, and the classes."""
+    rng = np.random.default_rng(6)
+    names = ["XL", "L", "M", "S", "XS"]
+    places = rng.integers(0, 4, 200)  # no XS
+    column = pd.Categorical.from_codes(places, names, ordered=True)
+    return pd.DataFrame({"size": column}), np.where(places < 2, "big", "small")
+
+
+def test_ordered_categories_keep_their_order_and_are_cut_like_numbers() -> None:
+    frame, labels = sizes()
+    mixed = frame["size"].isin(["L", "M"]).map({True: "inner", False: "outer"})
+    for classes, shown in ((labels, ["XL or L", "M or S or XS"]), (mixed, None)):
+        tree = FuzzyTreeClassifier().fit(frame, classes).tree_
+        assert tree.variables[0].categories == ("XL", "L", "M", "S", "XS")
+        terms = [term.name for term in tree.variables[0].terms]
+        assert terms == (shown or ["XL", "L or M", "S or XS"])
+
+
+@pytest.mark.parametrize("kind", ["pandas", "arrow", "parquet", "state"])
+def test_the_order_of_categories_comes_with_each_kind_of_table(
+    kind: str, tmp_path: Path
+) -> None:
+    frame, labels = sizes()
+    frame["kind"] = labels
+    source: object = frame
+    if kind == "arrow":
+        source = pa.Table.from_pandas(frame)
+    elif kind == "parquet":
+        source = tmp_path / "rows.parquet"
+        frame.to_parquet(source)
+    if kind == "state":
+        halves = [Learner("kind"), Learner("kind")]
+        for half, rows in zip(halves, (frame[:90], frame[90:]), strict=True):
+            half.update(rows)
+        tree = Learner.from_bytes(halves[1].merge(halves[0]).to_bytes()).learn()
+    else:
+        tree = ft.learn(source, target="kind")
+    assert tree.variables[0].categories == ("XL", "L", "M", "S", "XS")
+
+
+def test_parts_that_differ_in_the_order_have_none_whatever_the_order_of_parts() -> None:
+    frame, labels = sizes()
+    frame["kind"] = labels
+    other, plain = frame.copy(), frame.copy()
+    other["size"] = other["size"].cat.reorder_categories([*"SML", "XL", "XS"])
+    plain["size"] = plain["size"].astype(str)
+    empty = frame[:1].assign(size=None)
+    trees = []
+    for parts in ((frame, other, empty), (empty, other, frame), (frame, plain, frame)):
+        learner = Learner("kind")
+        for part in parts:
+            learner.update(part)
+        trees.append(learner.learn())
+        assert {*trees[-1].variables[0].categories} == {"XL", "L", "M", "S"}
+    assert trees[0] == trees[1]
