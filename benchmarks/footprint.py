@@ -176,7 +176,7 @@ def digits() -> FuzzyTree:
         ft.table(table.data, columns=names),
         target=labels,
         name="digits",
-        settings=ft.LearningSettings(mode="paper"),
+        settings=ft.LearningSettings(mode="paper", columns_per_node=1, l_max=4.0),
     )
 
 

@@ -155,7 +155,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         depth: How many conditions lead to a leaf, at most.
         alpha: Weight of the difference of means in the distance of two patterns, of the
             mode `paper`, as the next two.
-        l_max: How wide a margin must be before one column is trusted.
+        l_max: How wide a gap one column must leave before it is trusted; None is 8.
         patterns_per_class: How many shapes a class has: a number, or a number for each
             class by its name in the tree.
         points: n of the paper's 2n + 1 points on a fuzzy set, 1 to 8.

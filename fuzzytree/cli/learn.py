@@ -143,7 +143,7 @@ class PaperOptions:
     )
     l_max: Any = option(
         "--l-max",
-        "The paper's L_MAX, the largest ratio of distances.",
+        "The paper's L_MAX: how wide a gap one column must leave; 8 by default.",
         type=float,
     )
     patterns_per_class: Any = option(

@@ -359,7 +359,7 @@ class ArrayLearner:
         patterns, refused = wanted_patterns(ready.moments, ready.sample, numbers)
         rules = GrowthRules(
             alpha=0.9 if settings.alpha is None else settings.alpha,
-            l_max=settings.l_max or 4.0,
+            l_max=settings.l_max or 8.0,
             costs=ready.costs,
             keep_reversals=settings.keep_reversals,
             columns=settings.columns_per_node or len(self.columns),

@@ -36,7 +36,7 @@ class LearningSettings(
         alpha: Weight of the difference of means in the paper's distance; beta is
             1 - alpha. None is 0.9. Of paper mode, as the next two.
         l_max: The paper's L_MAX: large demands a wide margin before a feature is
-            trusted. None is 4.
+            trusted alone. None is 8.
         patterns_per_class: How many patterns (clusters) a class has: a number, or a
             number by class name (1 for classes not named). None is 1.
         keep_reversals: Whether a wide set that overtakes again far outside gets the

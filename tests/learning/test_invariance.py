@@ -174,7 +174,7 @@ def test_a_unit_near_the_ends_of_the_floats_keeps_the_questions_of_one_column(
     exponent: int,
 ) -> None:
     values, labels = public("iris")
-    settings = LearningSettings(mode="paper")
+    settings = LearningSettings(mode="paper", columns_per_node=1)
     base = learn((values, labels), settings).tree
     found = learn((np.ldexp(values, exponent), labels), settings).tree
     units = {column: Unit(exponent) for column in base.columns}
@@ -315,7 +315,7 @@ def test_columns_twenty_decades_apart_are_combined_as_if_they_were_alike() -> No
 
 def test_a_table_taken_twice_counts_twice_and_keeps_means_and_ends() -> None:
     values, labels = public("iris")
-    settings = LearningSettings(mode="paper")
+    settings = LearningSettings(mode="paper", columns_per_node=1)
     base = learn((values, labels), settings).tree
     twice = learn((np.tile(values, (2, 1)), np.tile(labels, 2)), settings).tree
     assert [leaf.support for leaf in twice.leaves] == [
