@@ -1,5 +1,7 @@
 """What learning costs: time beside GaussianNB's, memory, and very many classes.
 
+And what more rows of a class bring: accuracy at a wavy border, by `rows_per_class`.
+
 Run it with `python benchmarks/fit_cost.py`. Times are medians of interleaved runs;
 memory is the largest that was allocated beyond the table.
 """
@@ -19,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from sklearn.naive_bayes import GaussianNB
 
+import fuzzytree as ft
 from fuzzytree.learning import ArrayLearner, LearningSettings, learn_arrays
 
 FloatArray = npt.NDArray[np.float64]
@@ -28,10 +31,15 @@ T = TypeVar("T")
 ROWS, COLUMNS, CLASSES = 1_000_000, 11, 7
 MANY, MANY_COLUMNS, MANY_ROWS = 10_000, 16, 20
 REPEATS = 3
+WAVE_ROWS = 200_000
 
 
 def main() -> None:
     """Print the costs."""
+    print(f"a wavy border in {WAVE_ROWS:,} rows, by rows of a class")
+    for rows in (5_000, 20_000, 100_000):
+        share, leaves, seconds = at_a_wave(rows)
+        print(f"  {rows:7,}: accuracy {share:.4f}, {leaves} leaves, {seconds:.1f} s")
     for text, gap in (("apart", 2.0), ("overlapping", 0.5), ("noise", 0.0)):
         print(f"{ROWS:,} x {COLUMNS}, {CLASSES} classes, {text}")
         values, labels = gaussian_classes(ROWS, COLUMNS, CLASSES, gap)
@@ -42,6 +50,26 @@ def main() -> None:
     for task in (many_default, many_paper):
         mode, seconds, peak_gb = in_a_process(task)
         print(f"  {mode}: {seconds:.1f} s, peak of the process {peak_gb:.2f} GB")
+
+
+def wave(seed: int) -> tuple[FloatArray, IntArray]:
+    """Return rows on both sides of a sine."""
+    values = np.random.default_rng(seed).uniform(-1.0, 1.0, (WAVE_ROWS, 2))
+    return values, (values[:, 1] > np.sin(4.0 * values[:, 0])).astype(np.int64)
+
+
+def at_a_wave(rows_per_class: int) -> tuple[float, int, float]:
+    """Return accuracy on other rows, leaves, and seconds of processor time."""
+    values, labels = wave(0)
+    settings = LearningSettings(rows_per_class=rows_per_class)
+    start = time.process_time()
+    tree = learn_arrays(
+        values, labels, columns=["x", "y"], classes=["0", "1"], settings=settings
+    ).tree
+    seconds = time.process_time() - start
+    values, labels = wave(1)
+    predicted = np.asarray(ft.run(tree, values).classes).astype(np.int64)
+    return float((predicted == labels).mean()), len(tree.leaves), seconds
 
 
 def ratios(values: FloatArray, labels: IntArray) -> list[str]:
