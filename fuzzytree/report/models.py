@@ -43,6 +43,7 @@ from fuzzytree.model import (
     stand_ins,
 )
 from fuzzytree.rechecking import MISSING, interval_word, minute_word
+from fuzzytree.report.merged_rules import with_merged_propositions
 from fuzzytree.report.text import aligned, counted, number, some
 from fuzzytree.runtimes import Facts, OnnxModel, Outputs
 from fuzzytree.semantics import Status, curve_degree, rules_of
@@ -69,6 +70,8 @@ def model_lines(model: Document) -> Iterator[str]:
             yield head
         width = len(str(start + len(rules) - 1))
         for position, rule in enumerate(rules, start):
+            if isinstance(rule, Rule) and model.leaves:
+                rule = with_merged_propositions(rule, model.variables)
             yield f"{position:{width}}. {rule_text(rule)}{_rows_text(rule)}"
         start += len(rules)
     yield ""

@@ -147,7 +147,7 @@ def sizes() -> tuple[pd.DataFrame, np.ndarray]:
 
 def test_ordered_categories_keep_their_order_and_are_cut_like_numbers() -> None:
     frame, labels = sizes()
-    mixed = frame["size"].isin(["L", "M"]).map({True: "inner", False: "outer"})
+    mixed = np.where(frame["size"].isin(["L", "M"]), "inner", "outer")
     for classes, shown in ((labels, ["XL or L", "M or S or XS"]), (mixed, None)):
         tree = FuzzyTreeClassifier().fit(frame, classes).tree_
         assert tree.variables[0].categories == ("XL", "L", "M", "S", "XS")
