@@ -110,9 +110,10 @@ def outcome_of(
         )
     outputs, strengths = table[:first], table[first + 1 :]
     rule = np.zeros_like(outputs[0]) if model.outputs else outputs[0]
-    last = len(model.rule_labels)
+    last = len(model.leaves) or len(model.rules)
     for what, numbers, most in (("rule", rule, last), ("status", table[first], 3)):
-        if not np.isin(numbers, np.arange(most + 1)).all():
+        is_known = (numbers >= 0) & (numbers <= most) & (numbers == np.floor(numbers))
+        if not is_known.all():
             raise FuzzyTreeError(f"it answers a {what} that is none of 0 to {most}")
     return Outcome(
         rule.astype(np.int64),
