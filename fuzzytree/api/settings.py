@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, TypedDict, TypeVar
+from typing import TypedDict, TypeVar
 
 import msgspec
 
+from fuzzytree import auditing  # of which nothing is loaded before it is used
 from fuzzytree.learning import refuse_unknown
 from fuzzytree.model import Kind
-
-if TYPE_CHECKING:  # which learning and predicting do not need
-    from fuzzytree.auditing import Limits, Within
 
 S = TypeVar("S", bound=msgspec.Struct)
 
@@ -33,9 +31,9 @@ class AuditArguments(DrawArguments, total=False):
     level: float
     overlap: float
     budget: float
-    within: Within
+    within: auditing.Within
     spreads: float | None
-    limits: Limits
+    limits: auditing.Limits
     row: Mapping[str, float | str] | None
     select: Sequence[str]
     skip: Sequence[str]
