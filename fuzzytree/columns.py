@@ -6,7 +6,7 @@ is its own code, a truth value is 0 or 1, a date is the days since 1970-01-01 (U
 a text is a NaN whose payload is a hash of it; a missing cell is a NaN without payload.
 `Contents` counts the cells of each kind and keeps the different texts; two of them are
 merged by adding the counts and joining the texts. When all is read the texts become
-categories, sorted, and codes become positions.
+categories, sorted unless the column states their order, and codes become positions.
 """
 
 from __future__ import annotations

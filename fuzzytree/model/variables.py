@@ -66,7 +66,7 @@ class Variable(Value, frozen=True):
             added in this order, each operation rounded once to double.
         clips: Whether values are first moved into the range, of which one end may be
             open; only in fuzzy systems.
-        categories: The texts of a categorical input, sorted; the value of each is its
+        categories: The texts of a categorical input; the value of each is its
             position, from 0. Empty for numbers.
         missing: The value that stands for one that is missing, not finite or no
             category: a point of the input space like any other. None if such a row
