@@ -8,8 +8,6 @@ T is never below 0. The most powerful feature makes the most groups.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,12 +47,10 @@ def most_powerful(
     *,
     alpha: float,
     costs: FloatArray,
-    by_margin: bool,
 ) -> Grouping | None:
     """Return the feature that makes the most groups (step 4), or None.
 
-    Ties go to the cheaper feature, then (if wanted) to the wider margin between
-    groups in units of M_SD, then to the first.
+    Ties go to the cheaper feature, then to the first.
 
     Args:
         means: M of the node's patterns, shape (patterns, features).
@@ -62,7 +58,6 @@ def most_powerful(
         limits: T per feature.
         alpha: Weight of the means; beta is 1 - alpha.
         costs: Per feature.
-        by_margin: Whether the margin breaks ties before the order.
     """
     order = np.argsort(means, axis=0, kind="stable")
     sorted_means = np.take_along_axis(means, order, axis=0)
@@ -83,18 +78,9 @@ def most_powerful(
     if best < 2:
         return None
     tied = np.flatnonzero(power == best)
-    tied = tied[costs[tied] == costs[tied].min()]
-    groups = [
-        _groups(means[:, f], spreads[:, f], float(limits[f]), alpha) for f in tied
-    ]
-    chosen = 0
-    if by_margin and len(tied) > 1:
-        margins = [
-            _margin(means[:, f], spreads[:, f], found, alpha)
-            for f, found in zip(tied, groups, strict=True)
-        ]
-        chosen = int(np.argmax(margins))
-    return Grouping(int(tied[chosen]), groups[chosen])
+    chosen = int(tied[costs[tied].argmin()])
+    groups = _groups(means[:, chosen], spreads[:, chosen], limits[chosen], alpha)
+    return Grouping(chosen, groups)
 
 
 def components(
@@ -157,17 +143,3 @@ def _groups(
     labels = components(means, spreads, limit, alpha)
     order = np.lexsort((means, labels))
     return tuple(np.split(order, np.flatnonzero(np.diff(labels[order])) + 1))
-
-
-def _margin(
-    means: FloatArray, spreads: FloatArray, groups: Sequence[IntArray], alpha: float
-) -> float:
-    """Return the smallest distance between neighbouring groups, in units of M_SD."""
-    unit = float(spreads.mean())
-    smallest = np.inf
-    for left, right in itertools.pairwise(groups):
-        i, j = left[-1], right[0]
-        gap = alpha * abs(means[i] - means[j])
-        gap += (1.0 - alpha) * abs(spreads[i] - spreads[j])
-        smallest = min(smallest, gap)
-    return float(smallest / unit) if unit > 0 else np.inf

@@ -184,7 +184,6 @@ def _best_split(
         limits,
         alpha=rules.alpha,
         costs=features.costs,
-        by_margin=False,
     )
     if found is None:
         return None

@@ -26,7 +26,7 @@ def test_a_narrow_pattern_within_a_wide_one_is_apart_by_its_spread() -> None:
     assert components(means, spreads, 0.5, 0.9).tolist() == [0, 0, 1]
 
 
-def chosen(means: FloatArray, costs: list[float], *, by_margin: bool) -> int | None:
+def chosen(means: FloatArray, costs: list[float]) -> int | None:
     spreads = np.ones_like(means)
     found = most_powerful(
         means,
@@ -34,22 +34,20 @@ def chosen(means: FloatArray, costs: list[float], *, by_margin: bool) -> int | N
         threshold(spreads, 4.0, 0),
         alpha=1.0,
         costs=np.array(costs),
-        by_margin=by_margin,
     )
     return None if found is None else found.feature
 
 
 def test_the_feature_with_the_most_groups_is_the_most_powerful() -> None:
     means = np.array([[0.0, 0.0], [5.0, 5.0], [6.0, 10.0]])
-    assert chosen(means, [1.0, 1.0], by_margin=False) == 1
+    assert chosen(means, [1.0, 1.0]) == 1
 
 
-def test_ties_go_to_cost_then_margin_then_order() -> None:
+def test_ties_go_to_cost_then_order() -> None:
     means = np.array([[0.0, 0.0, 0.0], [5.0, 9.0, 5.0]])
-    assert chosen(means, [1.0, 1.0, 1.0], by_margin=False) == 0
-    assert chosen(means, [1.0, 1.0, 1.0], by_margin=True) == 1
-    assert chosen(means, [2.0, 2.0, 1.0], by_margin=True) == 2
+    assert chosen(means, [1.0, 1.0, 1.0]) == 0
+    assert chosen(means, [2.0, 2.0, 1.0]) == 2
 
 
 def test_no_feature_splits_what_is_close() -> None:
-    assert chosen(np.array([[0.0], [1.0]]), [1.0], by_margin=False) is None
+    assert chosen(np.array([[0.0], [1.0]]), [1.0]) is None

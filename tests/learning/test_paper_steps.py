@@ -45,7 +45,7 @@ def test_groups_are_the_connected_components_of_near_pairs(seed: int) -> None:
     assert np.array_equal(found[:, None] == found, reach)
 
 
-def powerful(costs: list[float], *, by_margin: bool = False) -> int:
+def powerful(costs: list[float]) -> int:
     """Return which of three features splits three patterns best."""
     means = np.array([[0.0, 0.0, 0.0], [0.5, 5.0, 9.0], [9.0, 10.0, 18.0]])
     found = most_powerful(
@@ -54,7 +54,6 @@ def powerful(costs: list[float], *, by_margin: bool = False) -> int:
         np.full(3, 2.0),
         alpha=1.0,
         costs=np.array(costs),
-        by_margin=by_margin,
     )
     assert found is not None
     return found.feature
@@ -68,10 +67,6 @@ def test_of_equally_powerful_features_the_cheapest_is_taken() -> None:
     assert powerful([0.0, 2.0, 1.0]) == 2  # the cheap first one makes fewer groups
 
 
-def test_then_the_wider_margin_may_decide() -> None:
-    assert powerful([1.0, 1.0, 1.0], by_margin=True) == 2
-
-
 def test_patterns_too_similar_to_split_stop_the_node() -> None:
     means, spreads = np.array([[1.0], [1.5]]), np.ones((2, 1))
     assert (
@@ -81,7 +76,6 @@ def test_patterns_too_similar_to_split_stop_the_node() -> None:
             np.array([2.0]),
             alpha=0.9,
             costs=np.ones(1),
-            by_margin=False,
         )
         is None
     )
