@@ -6,6 +6,10 @@ A decision tree of scikit-learn is grown on synthetic data and carried over to a
 FuzzyTree with the same cuts, so that both answer the same question. All candidates are
 timed in turn, again and again, and the median of each counts. Two kinds of data:
 few classes, and a class for each leaf, as a fuzzy tree has one pattern for each leaf.
+
+`--only learned` compares a learned tree of `--leaves` with one of scikit-learn that has
+as many, by what users call: `predict`, `predict_proba` and `fuzzytree.run`. Its times
+are processor time.
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ import argparse
 import os
 from collections.abc import Callable, Mapping
 from functools import partial
+from time import process_time_ns
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -22,8 +27,10 @@ import numpy.typing as npt
 from sklearn.tree import DecisionTreeClassifier
 from trees import COLUMNS, grow, tree_of, walk
 
+import fuzzytree
 from fuzzytree.benchmarking.clock import time_calls
 from fuzzytree.benchmarking.machine import load_averages, machine
+from fuzzytree.estimator import FuzzyTreeClassifier
 from fuzzytree.model.contracts import Run
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
@@ -49,6 +56,10 @@ def main() -> None:
         for leaves in options.leaves:
             for is_many in (False, True):
                 _descent(leaves, is_many=is_many, rounds=rounds, quick=options.quick)
+    if "learned" in options.only:
+        for leaves in options.leaves:
+            for columns in (1, None):
+                _learned(leaves, columns, quick=options.quick)
     if "rules" in options.only:
         for count in (7, 100, 1000):
             for kind in ("relative", "raw"):
@@ -102,6 +113,53 @@ def _descent(leaves: int, *, is_many: bool, rounds: int, quick: bool) -> None:
             candidates["skl2onnx in onnxruntime"] = _skl2onnx(grown, single)
         candidates.update(_onnx("tree", tree, values))
         _table(candidates, count, rounds if count > 1 else 20)
+
+
+def _learned(leaves: int, columns: int | None, *, quick: bool) -> None:
+    """Compare a learned tree, whose nodes test one column or combinations of many."""
+    chance = np.random.default_rng(0)
+    table = chance.normal(size=(20_000, 8))
+    wave = np.sin(3.0 * table[:, 0]) + np.cos(2.0 * table[:, 1] * table[:, 2])
+    score = wave + np.sin(2.0 * table[:, 3] + table[:, 4])
+    score += 0.3 * chance.normal(size=len(table))
+    labels = np.digitize(score, [-0.7, 0.2, 1.1])
+    ours = FuzzyTreeClassifier(leaves=leaves, min_rows=5, columns_per_node=columns)
+    ours.fit(table, labels)
+    count = ours.get_n_leaves()
+    peer = DecisionTreeClassifier(max_leaf_nodes=count, random_state=0)
+    peer.fit(table, labels)
+    tree = ours.tree_
+    print(
+        f"\n## learned, {count} leaves, {len(tree.variables)} variables, depth "
+        f"{ours.get_depth()}, sharpness {tree.semantics.sharpness}"
+    )
+    for rows in (1, 100, 10_000, 100_000 if quick else 1_000_000):
+        values = chance.normal(size=(rows, 8))
+        calls: dict[str, Callable[[], object]] = {
+            "scikit-learn predict": partial(peer.predict, values),
+            "our predict": partial(ours.predict, values),
+            "fuzzytree.run": partial(fuzzytree.run, tree, values),
+            "scikit-learn predict_proba": partial(peer.predict_proba, values),
+            "our predict_proba": partial(ours.predict_proba, values),
+        }
+        repeats = max(500 // rows, 1)
+        taken = {name: _processor_ns(call, repeats) for name, call in calls.items()}
+        first = next(iter(taken.values()))
+        print(f"\n{'rows ' + format(rows, ','):34} {'ratio':>9} {'ns a row':>12}")
+        for name, time in taken.items():
+            print(f"{name:34} {time / first:9.4f} {time / rows:12.1f}")
+
+
+def _processor_ns(call: Callable[[], object], repeats: int) -> float:
+    """Return the least processor time of a call, of three rounds after a first one."""
+    call()
+    times: list[int] = []
+    for _ in range(3):
+        start = process_time_ns()
+        for _ in range(repeats):
+            call()
+        times.append(process_time_ns() - start)
+    return min(times) / repeats
 
 
 def _rules(count: int, *, raw: bool, rounds: int) -> None:

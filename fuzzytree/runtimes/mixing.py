@@ -157,7 +157,7 @@ def mix(rules: RuleBase) -> Run:
                 with np.errstate(all="ignore"):
                     known = known_rows(plan.axes, array[:, part])
                     lines = input_lines(plan.axes, array[:, part][:, known])
-                    rule[part][known], mixed = _walk_rows(rules, plan.axes, walk, lines)
+                    rule[part][known], mixed = walk_rows(rules, plan.axes, walk, lines)
                 status[part][~known] = Status.MISSING
                 shares[:, part][:, known] = mixed
             else:
@@ -172,7 +172,7 @@ def mix(rules: RuleBase) -> Run:
     return run
 
 
-def _walk_rows(
+def walk_rows(
     rules: RuleBase, axes: Axes, walk: Sequence[MixedFork], inputs: Reals
 ) -> tuple[IntArray, FloatArray]:
     """Return the rule of strength 1 of each row, and the shares of the classes."""

@@ -56,7 +56,7 @@ def edge_values(rules: RuleBase) -> FloatArray:
 def walks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Walk tables of any size, in chunks of 128 rows, and note how many walks."""
     counts: list[int] = []
-    walk = mixing._walk_rows
+    walk = mixing.walk_rows
 
     def counting(*arguments: object) -> object:
         counts.append(1)
@@ -64,7 +64,7 @@ def walks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     for name, value in (("_FEWEST", 1), ("_LEAST_COST", 0.0), ("_WALK", 128)):
         monkeypatch.setattr(mixing, name, value)
-    monkeypatch.setattr(mixing, "_walk_rows", counting)
+    monkeypatch.setattr(mixing, "walk_rows", counting)
     return counts
 
 
