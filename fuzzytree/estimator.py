@@ -214,7 +214,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         points: int = 3,
         separate_sides: bool = False,
         shrinkage: float = 1e-3,
-        entry: float = 2.0,
+        entry: float = 0.0,
         costs: Mapping[str, float] | None = None,
         class_weight: LabelWeight = None,
         rows_per_class: int | None = None,

@@ -284,6 +284,9 @@ def _all_flanks(
     result: list[_Flanks] = []
     largest = 0.0
     for key, split in zip(keys, sketch.splits, strict=True):
+        if split.flanks is not None:
+            result.append(_tuned_flanks(split.cuts, split.flanks))
+            continue
         field = _Field.of(split, axes[key])
         ends: dict[int, list[float]] = {-1: [], 1: []}
         for cut in range(len(split.cuts)):
@@ -293,6 +296,12 @@ def _all_flanks(
                 largest = max(largest, error)
         result.append(_Flanks(tuple(ends[-1]), tuple(ends[1])))
     return result, largest
+
+
+def _tuned_flanks(cuts: FloatArray, reach: FloatArray) -> _Flanks:
+    left = np.minimum(cuts - reach, np.nextafter(cuts, -np.inf))
+    right = np.maximum(cuts + reach, np.nextafter(cuts, np.inf))
+    return _Flanks(tuple(left.tolist()), tuple(right.tolist()))
 
 
 def _flank_end(

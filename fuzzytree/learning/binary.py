@@ -14,9 +14,6 @@ from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.splitting import Style, best_split
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
 
-COSTS = np.array([0.0, *np.geomspace(0.5, 512.0, 31)])
-"""Costs of a leaf, in rows, that are tried: one leaf more must save so many."""
-
 
 @dataclass
 class BinaryTree:

@@ -1,9 +1,9 @@
-"""Held-out rows choose: what splits the nodes, and how far the tree is pruned.
+"""Held-out rows choose: what splits the nodes, how many leaves, how firmly to tune.
 
-Trees are grown without a part of the rows and answer these. The cost of a leaf that
-loses the fewest of them prunes the tree of all rows; among costs that are as good up to
-half a standard error, half the largest is taken. A richer way to split is chosen only
-if it is right on more of the rows on which two trees differ than chance explains.
+Trees are grown without a part of the rows, pruned by falling costs of a leaf, tuned,
+and rated by the rows left out: each adds 1 if it is answered right, less half its
+log-loss. Of each way to split the smallest trees count that are as good as the best, up
+to half a standard error; the way with the best score is taken.
 """
 
 from __future__ import annotations
@@ -13,27 +13,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.binary import COSTS, BinaryTree, grown, limited, pruning
+from fuzzytree.learning.binary import BinaryTree, grown, limited, pruning
 from fuzzytree.learning.nodes import SplitRules
-from fuzzytree.learning.refinement import refined
 from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.sampling import hashed
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.splitting import Style
-from fuzzytree.learning.units import FloatArray, IntArray, tallied
+from fuzzytree.learning.tuning import SoftTree
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
 
+_COSTS = (*(512.0 / 2**k for k in range(11)), 0.0)  # of a leaf, in rows
 _FOLDS = 5
-_REPEATS = 2
-_FEW_ROWS = 1_000
-_FEW_CELLS = 20_000
 _FEWEST = 20
 _ROWS = 4_000
 _CELLS = 250_000
 _MANY_CLASSES = 100
 _COST_OF_MANY = 2.0  # of a leaf, where there are too many classes to hold rows out
-_SLACK = 0.5
-_STEPS_BACK = 3  # from the largest cost that is good enough: to half of it
-_SURE = 0.5
+_SLACK = 0.5  # in standard errors
+_PATIENCE = 2
+_LOOSE = 3.0  # penalties on moving a gate
+_FIRM = 30.0
+_UNLIKELY = 1e-3
+_DIGITS = 6
 _FURTHER_ROWS = 2.0 ** np.arange(-1, 9)
 _COINCIDENCES = 0.02  # equal pairs for each distinct row, from which on they are many
 
@@ -45,16 +46,17 @@ class ChosenTree:
     """The tree that was chosen.
 
     Attributes:
-        tree: Pruned and refined.
+        tree: Pruned and tuned.
         style: What splits its nodes.
         accuracy: Share of right answers among the rows held out; None without such.
-        further_rows: See `_Trial`.
+        further_rows: How many rows that belong to all classes evenly are added to the
+            leaves, for the frequencies of classes to make the rows left out likeliest.
     """
 
     tree: BinaryTree
     style: Style
     accuracy: float | None
-    further_rows: float
+    further_rows: float = 2.0
 
 
 def chosen_tree(
@@ -64,26 +66,33 @@ def chosen_tree(
     progress: Progress,
 ) -> ChosenTree:
     """Return the tree for the settings, chosen by held-out rows."""
-    styles = _styles(rows, rules)
-    folds = folds_of_rows(rows, settings.seed, repeats=_REPEATS)
-    best: _Trial | None = None
-    for number, style in enumerate(styles):
-        share = number / len(styles)
-        progress("choosing", share)
-        for trial in _tried(rows, rules, settings, folds, style):
-            if best is None or trial.beats(best):
-                best = trial
-    assert best is not None
+    styles, folds = _styles(rows, rules), folds_of_rows(rows, settings.seed)
+    depth = settings.depth or rows.size
+    trials: list[_Trial] = []
+    for number, style in enumerate(styles if folds else ()):
+        progress("choosing", number / len(styles))
+        trees = [grown(rows, fold.learnt, rules, style, depth) for fold in folds]
+        trials.append(_best_size(rows, settings, folds, style, trees, rules.min_rows))
+    best = max(trials, key=lambda trial: trial.score) if trials else None
+    if best is not None and best.style != "columns":
+        further = _tried(
+            rows, folds, best.style, best.cost, best.trees, _FIRM, rules.min_rows
+        )
+        if further.score > best.score:
+            best = further
     progress("growing", 0.0)
     at = np.arange(rows.size)
-    depth = settings.depth or rows.size
+    style = styles[0] if best is None else best.style
     tree = grown(
-        rows, at, rules, best.style, depth, lambda share: progress("growing", share)
+        rows, at, rules, style, depth, lambda share: progress("growing", share)
     )
-    tree = _pruned(tree, settings, best.cost)
-    if best.refines:
-        tree = refined(tree, rows, at)
-    return ChosenTree(tree, best.style, best.accuracy, best.further_rows)
+    if best is None:
+        many = len(np.unique(rows.codes)) > _MANY_CLASSES
+        tree = _pruned(tree, settings, _COST_OF_MANY if many else 0.0)
+        return ChosenTree(tree, style, None)
+    soft = SoftTree.of(_pruned(tree, settings, best.cost), rows, at)
+    tree = soft.tuned(best.penalty).crisp(rules.min_rows)
+    return ChosenTree(tree, style, best.accuracy, best.further_rows(rows, folds))
 
 
 def _styles(rows: TrainingRows, rules: SplitRules) -> list[Style]:
@@ -105,7 +114,7 @@ class Fold:
     left_out: IntArray
 
 
-def folds_of_rows(rows: TrainingRows, seed: int, *, repeats: int) -> list[Fold]:
+def folds_of_rows(rows: TrainingRows, seed: int) -> list[Fold]:
     """Return folds of a bounded part of the rows, with all classes in each part.
 
     Copies of a row share a fold, or a tree would be tested on what it has seen.
@@ -113,28 +122,18 @@ def folds_of_rows(rows: TrainingRows, seed: int, *, repeats: int) -> list[Fold]:
     Args:
         rows: To learn from.
         seed: Moves the folds.
-        repeats: How often few rows are divided, each time in another way.
     """
     classes = len(np.unique(rows.codes))
     if classes > _MANY_CLASSES or rows.size < _FEWEST:
         return []
     width = max(1, len(rows.searched))
     most = max(400, 4 * classes, min(_ROWS, _CELLS // width))
-    few = min(_FEW_ROWS // rows.size, _FEW_CELLS // (rows.size * width))
-    repeats = max(1, min(repeats, few))
-    folds: list[Fold] = []
     owners = _copies(rows)
-    kept = np.zeros(0, np.int64)
-    for repeat in range(repeats):
-        shuffled = hashed(owners + 1_000_003 * (seed + 1) + repeat)
-        order = np.argsort(shuffled, kind="stable")
-        if repeat == 0:
-            kept = np.sort(order[:most])
-        order = order[np.isin(order, kept)]
-        order = order[np.argsort(rows.codes[order], kind="stable")]
-        turn = np.cumsum(np.diff(owners[order], prepend=owners[order[0]]) != 0) % _FOLDS
-        folds += [Fold(order[turn != k], order[turn == k]) for k in range(_FOLDS)]
-    return folds
+    order = np.argsort(hashed(owners + 1_000_003 * (seed + 1)), kind="stable")[:most]
+    order = order[np.argsort(rows.codes[order], kind="stable")]
+    turn = np.cumsum(np.diff(owners[order], prepend=owners[order[0]]) != 0) % _FOLDS
+    learnt = [np.sort(order[turn != k]) for k in range(_FOLDS)]
+    return [Fold(learnt[k], order[turn == k]) for k in range(_FOLDS)]
 
 
 def _copies(rows: TrainingRows) -> IntArray:
@@ -159,83 +158,110 @@ def _copies(rows: TrainingRows) -> IntArray:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A way to split with its best cost of a leaf.
+    """Trees of one way to split and one cost of a leaf, rated by rows held out.
 
     Attributes:
         style: What splits the nodes.
-        refines: Whether the splits move afterwards.
         cost: Of a leaf, in rows.
-        right: How often each row is answered rightly when it is left out.
-        weights: Of the rows; 0 for those that never are.
-        further_rows: How many rows that belong to all classes evenly are added to the
-            leaves, for the frequencies of classes to make the rows left out likeliest.
+        penalty: On moving a gate when the trees are tuned.
+        trees: One for each fold, pruned and not yet tuned.
+        crisp: The same, tuned.
+        is_right: Of the rows held out, fold by fold: whether they are answered right.
+        likely: The logarithms of the chances that their own classes are given.
+        weights: Their weights.
     """
 
     style: Style
-    refines: bool
     cost: float
-    right: FloatArray
+    penalty: float
+    trees: list[BinaryTree]
+    crisp: list[BinaryTree]
+    is_right: BoolArray
+    likely: FloatArray
     weights: FloatArray
-    further_rows: float = 2.0
 
     @property
-    def accuracy(self) -> float | None:
+    def accuracy(self) -> float:
         """The share of right answers, by weight."""
-        if not len(self.right):
-            return None
-        return float(self.weights @ self.right / self.weights.sum())
+        return float(self.weights @ self.is_right / self.weights.sum())
 
-    def beats(self, other: _Trial) -> bool:
-        """Return whether the rows on which two trees differ favour this one."""
-        won = self.weights * (self.right - other.right)
-        return float(won.sum()) > _SURE * float(np.sqrt((won**2).sum()))
+    @property
+    def scores(self) -> FloatArray:
+        """What each row adds to the score: 1 if it is right, less half its log-loss."""
+        return self.weights * (self.is_right + self.likely / 2)
+
+    @property
+    def score(self) -> float:
+        """The whole score, rounded so that it is the same on every machine."""
+        return round(float(self.scores.sum()), _DIGITS)
+
+    def is_as_good_as(self, other: _Trial) -> bool:
+        """Return whether the score is lower by no more than chance explains."""
+        lost = other.scores - self.scores
+        error = _SLACK * float(np.sqrt((lost**2).sum()))
+        return round(float(lost.sum()) - error, _DIGITS) <= 0.0
+
+    def further_rows(self, rows: TrainingRows, folds: list[Fold]) -> float:
+        """Return `ChosenTree.further_rows`."""
+        losses = np.zeros(len(_FURTHER_ROWS))
+        for tree, fold in zip(self.crisp, folds, strict=True):
+            losses += _log_losses(tree, rows, fold)
+        return float(_FURTHER_ROWS[int(np.round(losses, 6).argmin())])
+
+
+def _best_size(
+    rows: TrainingRows,
+    settings: LearningSettings,
+    folds: list[Fold],
+    style: Style,
+    trees: list[BinaryTree],
+    min_rows: int,
+) -> _Trial:
+    """Return the smallest trees that are as good as the best.
+
+    Costs of a leaf fall until the trees have grown several times for nothing.
+    """
+    trials: list[_Trial] = []
+    leaves: list[int] = []
+    best = 0
+    for cost in _COSTS:
+        pruned = [_pruned(tree, settings, cost) for tree in trees]
+        sizes = [tree.leaves for tree in pruned]
+        if sizes == leaves:
+            continue
+        leaves = sizes
+        trial = _tried(rows, folds, style, cost, pruned, _LOOSE, min_rows)
+        trials.append(trial)
+        if trial.score > trials[best].score:
+            best = len(trials) - 1
+        elif len(trials) > best + _PATIENCE:
+            break
+    return next(trial for trial in trials if trial.is_as_good_as(trials[best]))
 
 
 def _tried(
     rows: TrainingRows,
-    rules: SplitRules,
-    settings: LearningSettings,
     folds: list[Fold],
     style: Style,
-) -> list[_Trial]:
-    """Grow a tree for each fold, and find the cost that prunes them best."""
-    if not folds:
-        cost = _COST_OF_MANY if len(np.unique(rows.codes)) > _MANY_CLASSES else 0.0
-        return [_Trial(style, False, cost, np.zeros(0), np.zeros(0))]
-    right, total = np.zeros(len(COSTS)), 0.0
-    trees: list[BinaryTree] = []
-    for fold in folds:
-        tree = grown(rows, fold.learnt, rules, style, settings.depth or rows.size)
-        trees.append(tree)
-        right += _right_by_cost(tree, rows, fold.left_out)
-        total += float(rows.weights[fold.left_out].sum())
-    lost = 1.0 - right / total
-    best = max(0.0, float(lost.min()))
-    held_out = len(np.unique(np.concatenate([fold.left_out for fold in folds])))
-    error = _SLACK * np.sqrt(best * (1.0 - best) / held_out)
-    good = np.flatnonzero(lost <= best + error + 1e-12)
-    place = max(int(good.max()) - _STEPS_BACK, int(good.min()))
-    cost = float(COSTS[place])
-    ready = [_pruned(tree, settings, cost) for tree in trees]
-    found: list[_Trial] = []
-    for refines in (False, True) if style != "columns" else (False,):
-        if refines:
-            ready = [
-                refined(tree, rows, fold.learnt)
-                for tree, fold in zip(ready, folds, strict=True)
-            ]
-        right, weights = np.zeros(rows.size), np.zeros(rows.size)
-        losses = np.zeros(len(_FURTHER_ROWS))
-        for tree, fold in zip(ready, folds, strict=True):
-            given = tree.answers(rows, fold.left_out)
-            right[fold.left_out] += given == rows.codes[fold.left_out]
-            weights[fold.left_out] += 1.0
-            losses += _log_losses(tree, rows, fold)
-        right /= np.maximum(weights, 1.0)
-        weights = np.where(weights > 0, rows.weights, 0.0)
-        further_rows = float(_FURTHER_ROWS[int(np.round(losses, 6).argmin())])
-        found.append(_Trial(style, refines, cost, right, weights, further_rows))
-    return found
+    cost: float,
+    trees: list[BinaryTree],
+    penalty: float,
+    min_rows: int,
+) -> _Trial:
+    """Tune the tree of each fold and let it answer the rows held out."""
+    crisp: list[BinaryTree] = []
+    right: list[BoolArray] = []
+    likely: list[FloatArray] = []
+    for tree, fold in zip(trees, folds, strict=True):
+        soft = SoftTree.of(tree, rows, fold.learnt).tuned(penalty)
+        crisp.append(soft.crisp(min_rows))
+        codes = rows.codes[fold.left_out]
+        right.append(crisp[-1].answers(rows, fold.left_out) == codes)
+        own = soft.chances(fold.left_out)[np.arange(len(codes)), codes]
+        likely.append(np.log(np.maximum(own, _UNLIKELY)))
+    weights = rows.weights[np.concatenate([fold.left_out for fold in folds])]
+    joined = np.concatenate(right), np.concatenate(likely)
+    return _Trial(style, cost, penalty, trees, crisp, *joined, weights)
 
 
 def _log_losses(tree: BinaryTree, rows: TrainingRows, fold: Fold) -> FloatArray:
@@ -255,23 +281,6 @@ def _log_losses(tree: BinaryTree, rows: TrainingRows, fold: Fold) -> FloatArray:
             chances = of_class / (counts.sum() + _FURTHER_ROWS)
             losses -= rows.weights[inside] @ np.log(chances)
     return losses
-
-
-def _right_by_cost(tree: BinaryTree, rows: TrainingRows, at: IntArray) -> FloatArray:
-    """Return the weight of right answers for each cost of a leaf."""
-    reached = tree.reaching(rows, at)
-    own = np.zeros(len(tree.splits))
-    for node, inside in reached.items():
-        is_right = rows.codes[inside] == tree.labels[node]
-        own[node] = rows.weights[inside][is_right].sum()
-    ends = pruning(tree, COSTS).ends
-    total = np.zeros((len(own), len(COSTS)))
-    for node in reversed(range(len(own))):
-        left, right = tree.children[node]
-        below = total[left] + total[right] if left else 0.0
-        total[node] = np.where(ends[node], own[node], below)
-    whole: FloatArray = total[0]
-    return whole
 
 
 def _pruned(tree: BinaryTree, settings: LearningSettings, cost: float) -> BinaryTree:

@@ -6,6 +6,8 @@ a cut is what its cloud says, so that nodes of few rows do not follow single one
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fuzzytree.learning.cuts import SplitAxis, tail
@@ -35,6 +37,7 @@ _STARTS_BY_CLASSES = 1_000
 _RIDGE = 0.01
 _STRAY = 0.2  # share of a class; what is less came to a node by chance
 _FEW_COLUMNS = 16
+_ENTRY = 2.0  # the smallest partial F of a further column, where there are many
 
 
 def class_groups(node: Chosen, rules: SplitRules) -> list[BoolArray]:
@@ -106,7 +109,8 @@ def parted_clouds(
     direction: FloatArray | None = white @ axis
     if len(selected) > min(_FEW_COLUMNS, rules.columns):
         costs = rules.costs[node.rows.combinable]
-        selected = selected_columns(standard, is_right, node.weights, rules, costs)
+        strict = replace(rules, entry=max(rules.entry, _ENTRY))
+        selected = selected_columns(standard, is_right, node.weights, strict, costs)
         white = _whitening(scatter[np.ix_(selected, selected)])
         places = (means - middle)[:, selected] @ white
         basis = _span(places[counts], sizes[counts])

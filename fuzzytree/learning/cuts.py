@@ -338,12 +338,15 @@ class TreeSplit:
         cuts: Increasing; interval i is (cuts[i - 1], cuts[i]].
         owners: The branch of each interval; neighbours differ.
         groups: The patterns of each branch.
+        flanks: How far beyond each cut the relative terms fall to 0; None where the
+            sets of the patterns say it.
     """
 
     axis: SplitAxis
     cuts: FloatArray
     owners: IntArray
     groups: tuple[IntArray, ...]
+    flanks: FloatArray | None = None
 
     def branches(self, rows: FloatArray) -> IntArray:
         """Return the branch that each row takes."""

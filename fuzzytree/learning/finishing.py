@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -73,7 +73,7 @@ def finished_tree(
     for node, split in enumerate(sketch.splits):
         groups = [_below(sketch, child) for child in sketch.children[node]]
         found = tuple(np.sort(held[np.array(group)]) for group in groups)
-        sketch.splits[node] = TreeSplit(split.axis, split.cuts, split.owners, found)
+        sketch.splits[node] = replace(split, groups=found)
     return FinishedTree(sketch, patterns, leaves)
 
 
@@ -91,6 +91,7 @@ def _joined(
         return split, [*tree.children[node]]
     column = axis.features[0]
     cuts: list[float] = []
+    flanks: list[float] = []
     below: list[int] = []
     todo = [node]
     while todo:  # in the order of the intervals
@@ -100,6 +101,7 @@ def _joined(
             split = tree.splits[~one]
             assert split is not None  # its node is split
             cuts.append(float(split.cuts[0]))
+            flanks += [] if split.flanks is None else split.flanks.tolist()
         elif (
             found is None or found.axis.is_combined or found.axis.features[0] != column
         ):
@@ -108,7 +110,8 @@ def _joined(
             left, right = tree.children[one]
             todo += [right, ~one, left]
     owners = np.arange(len(cuts) + 1)
-    return TreeSplit(axis, np.array(cuts), owners, ()), below
+    ends = np.array(flanks) if len(flanks) == len(cuts) else None
+    return TreeSplit(axis, np.array(cuts), owners, (), ends), below
 
 
 def _placed(split: TreeSplit, rows: TrainingRows, at: IntArray) -> TreeSplit:
@@ -124,7 +127,8 @@ def _placed(split: TreeSplit, rows: TrainingRows, at: IntArray) -> TreeSplit:
     ]
     cuts = SplitCuts(np.array(middle), split.owners)
     found = axis.settled(cuts, values, moved, rows.units)
-    return TreeSplit(axis, found.cuts, found.owners, ())
+    flanks = split.flanks if len(found.cuts) == len(split.cuts) else None
+    return TreeSplit(axis, found.cuts, found.owners, (), flanks)
 
 
 def _below(sketch: Sketch, child: int) -> list[int]:

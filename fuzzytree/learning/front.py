@@ -59,7 +59,7 @@ def front_of(
         rules: What a split must keep to.
         settings: How to learn; its `leaves` and `depth` are limits here too.
     """
-    folds = folds_of_rows(rows, settings.seed, repeats=1)
+    folds = folds_of_rows(rows, settings.seed)
     if not folds:
         return None
     wide = min(rules.columns, max(len(rows.combinable), 1))

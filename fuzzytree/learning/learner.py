@@ -32,6 +32,7 @@ from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
+from fuzzytree.learning.tuning import SHARPNESS
 from fuzzytree.learning.units import FloatArray, IntArray, tallied
 from fuzzytree.learning.weights import (
     MOST_COPIES,
@@ -264,12 +265,14 @@ class ArrayLearner:
         )
         progress("fitting sets", 1.0)
         places = {name: place for place, name in enumerate(self.columns)}
+        is_tuned = any(split.flanks is not None for split in grown.sketch.splits)
         tree = with_probabilities(
             made.tree,
             sample,
             ready.weights,
             places,
             further_rows=grown.further_rows,
+            sharpness=SHARPNESS if is_tuned else None,
         )
         if self.settings.mode != "paper":
             tree = described(tree, self.columns, ready.table, self.statistics)
@@ -388,8 +391,10 @@ class ArrayLearner:
         supports = self._rows_by_class(
             found.sketch, found.leaves, codes, ready.supports
         )
+        is_tuned = any(split.flanks is not None for split in found.sketch.splits)
+        together = ", tuned together" if is_tuned else ""
         facts: dict[str, Any] = {
-            "chosen": {"splits": _STYLES[choice.style]},
+            "chosen": {"splits": _STYLES[choice.style] + together},
             "inner_accuracy": choice.accuracy,
         }
         return _Grown(

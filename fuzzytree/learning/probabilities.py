@@ -48,6 +48,7 @@ def with_probabilities(
     columns: dict[str, int],
     *,
     further_rows: float = 2.0,
+    sharpness: int | None = None,
 ) -> FuzzyTree:
     """Return a tree whose leaves have probabilities.
 
@@ -59,17 +60,17 @@ def with_probabilities(
         weights: How many rows of the table each row stands for, by its weight.
         columns: The position of each column in the rows.
         further_rows: How many rows at each leaf belong to all classes evenly.
+        sharpness: The power of the strengths; None for the best.
     """
     leaves, classes = len(tree.leaves), len(tree.classes)
     if leaves > MOST_MIXED or leaves * classes > MOST_PROBABILITIES:
         return tree
-    few = _thinned(sample, _MOST_TO_CHOOSE // leaves)
-    rows = _rated(tree, sample, few, weights, columns)
-    fits = [(_fitted(rows, one, further_rows)[1], one) for one in _TRIED]
-    sharpness = min(fits)[1]
+    if sharpness is None:
+        few = _thinned(sample, _MOST_TO_CHOOSE // leaves)
+        rows = _rated(tree, sample, few, weights, columns)
+        sharpness = min((_fitted(rows, k, further_rows)[1], k) for k in _TRIED)[1]
     many = _thinned(sample, _MOST_TO_FIT // leaves)
-    if len(many) > len(few):
-        rows = _rated(tree, sample, many, weights, columns)
+    rows = _rated(tree, sample, many, weights, columns)
     vectors = _in_parts(_fitted(rows, sharpness, further_rows)[0])
     semantics = msgspec.structs.replace(tree.semantics, sharpness=sharpness)
     ends = tuple(

@@ -69,7 +69,7 @@ class LearningSettings(
     leaves: int | None = None
     min_rows: int | None = None
     depth: int | None = None
-    entry: float = 2.0
+    entry: float = 0.0
     shrinkage: float = 1e-3
     alpha: float | None = None
     l_max: float | None = None

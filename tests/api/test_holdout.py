@@ -163,10 +163,10 @@ def test_a_table_of_100_000_columns_is_tested_in_two_folds() -> None:
 
 def test_folds_of_whole_groups_do_not_learn_from_what_they_test_on() -> None:
     random = np.random.default_rng(0)
-    places = random.normal(size=(20, 3))  # of groups, each of 10 rows that are alike
-    labels = np.arange(20) % 2  # which say nothing of the places
-    values = np.repeat(places, 10, axis=0) + random.normal(0.0, 1e-3, (200, 3))
-    rows = np.column_stack([values, np.repeat(np.arange(20.0), 10)])
+    places = random.normal(size=(60, 3))  # of groups, each of 10 rows that are alike
+    labels = np.arange(60) % 2  # which say nothing of the places
+    values = np.repeat(places, 10, axis=0) + random.normal(0.0, 1e-3, (600, 3))
+    rows = np.column_stack([values, np.repeat(np.arange(60.0), 10)])
     source = table(rows, columns=["a", "b", "c", "group"])
     whole = read_table(source, target=np.repeat(labels, 10).tolist())
     rest, groups = grouped(whole, "group")

@@ -71,7 +71,7 @@ def test_an_experiment_reports_rates_table_divisions_and_accuracy(
         "sensor    6 x 6 cells, full 200, threshold 0\n"
         "features  log paper / force, log parts / force, axis, log size, place (24: "
         "log S1 / force, ..., y)\n"
-        "learnt    default mode, shrinkage 0.001, entry 2; 2 leaves, which ask for 1 "
+        "learnt    default mode, shrinkage 0.001, entry 0; 2 leaves, which ask for 1 "
         "feature\n"
         "\n"
         "class    frames  right  rate\n"

@@ -138,7 +138,8 @@ def test_learn_finds_the_columns_of_whole_numbers() -> None:
     doors, mass = chance.integers(1, 9, 200).astype(float), chance.uniform(0, 9, 200)
     doors[::7] = np.nan
     labels = np.where((doors > 4) | (mass > 6), "a", "b")
-    tree = learn(np.column_stack([doors, mass]), target=labels)
+    rows = np.column_stack([doors, mass])
+    tree = learn(rows, target=labels, columns_per_node=1)
     assert {one.name: one.is_whole for one in tree.variables} == {
         "x1": True,
         "x2": False,

@@ -66,7 +66,7 @@ def test_a_floor_that_was_measured_is_the_usual_one() -> None:
 
 
 def test_few_presses_are_enough_for_the_usual_floor() -> None:
-    assert share_right(usual_recogniser(5), 1.0) >= 0.95
+    assert share_right(usual_recogniser(5), 1.0) >= 0.9
 
 
 @pytest.mark.heavy
