@@ -1570,7 +1570,9 @@ def _batch_pieces(
                 is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
                 cells[place] = number_array(data) if is_number else data.to_pylist()
                 if str(kind).startswith(("string", "large_string", "dictionary")):
-                    texts[columns[place]] = _order_of(data)
+                    facts = table.schema.field(title).metadata or {}
+                    is_enum = any(key.startswith(b"_PL_ENUM") for key in facts)
+                    texts[columns[place]] = () if is_enum else _order_of(data)
         where, count = _row_names(name, first), table.num_rows
         yield TablePiece(
             name, columns, (*cells,), count, where, titles, frame=table, texts=texts
