@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from fuzzytree.learning.clouds import clouds_of
 from fuzzytree.learning.cuts import TreeSplit
-from fuzzytree.learning.nodes import SplitRules
+from fuzzytree.learning.nodes import Clouds, SplitRules
 from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.splitting import Style, best_split
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
@@ -99,45 +100,68 @@ class BinaryTree:
         return result
 
 
-def grown(
-    rows: TrainingRows,
-    at: IntArray,
-    rules: SplitRules,
-    style: Style,
-    depth: int,
-    progress: Callable[[float], None] | None = None,
-) -> BinaryTree:
-    """Return a tree that is grown until no split pays.
+@dataclass
+class GrowingTree:
+    """A tree that grows as far as it is needed.
 
-    Args:
+    Attributes:
         rows: To learn from.
         at: Which of them.
         rules: What a split must keep to.
         style: What splits a node.
         depth: How many nodes a path may have.
-        progress: Called with the share of rows that have a leaf.
+        tree: What has grown so far.
     """
-    tree = BinaryTree()
-    todo = [(tree.add(rows, at), at, 0)]
-    whole = clouds_of(rows, at) if style == "centres" else None
-    settled = 0
-    while todo:
-        node, inside, level = todo.pop()
-        split = None
-        if level < depth:
-            split = best_split(rows, inside, rules, style, whole)
-        if split is None:
-            settled += len(inside)
-            if progress is not None:
-                progress(settled / len(at))
-            continue
-        taken = split.branches(rows.values[inside])
-        tree.splits[node] = split
-        parts = [inside[taken == 0], inside[taken == 1]]
-        left, right = (tree.add(rows, part) for part in parts)
-        tree.children[node] = (left, right)
-        todo += [(right, parts[1], level + 1), (left, parts[0], level + 1)]
-    return tree
+
+    rows: TrainingRows
+    at: IntArray
+    rules: SplitRules
+    style: Style
+    depth: int
+    tree: BinaryTree = field(default_factory=BinaryTree)
+    _todo: list[tuple[int, IntArray, int]] = field(default_factory=list[Any])
+    _whole: Clouds | None = None
+
+    def __post_init__(self) -> None:
+        """Plant the root."""
+        self._todo.append((self.tree.add(self.rows, self.at), self.at, 0))
+        if self.style == "centres":
+            self._whole = clouds_of(self.rows, self.at)
+
+    def grown(
+        self, cost: float, progress: Callable[[float], None] | None = None
+    ) -> BinaryTree:
+        """Return the tree, grown until no split pays that pruning could leave.
+
+        A node with no more wrong rows than a leaf costs has none, the root excepted.
+
+        Args:
+            cost: Of a leaf, in rows; no larger than at the last call.
+            progress: Called with the share of rows that have a leaf.
+        """
+        tree, waiting, settled = self.tree, [], 0
+        while self._todo:
+            node, inside, level = self._todo.pop()
+            split = None
+            if node and tree.wrong[node] <= cost:
+                waiting.append((node, inside, level))
+            elif level < self.depth:
+                split = best_split(
+                    self.rows, inside, self.rules, self.style, self._whole
+                )
+            if split is None:
+                settled += len(inside)
+                if progress is not None:
+                    progress(settled / len(self.at))
+                continue
+            taken = split.branches(self.rows.values[inside])
+            tree.splits[node] = split
+            parts = [inside[taken == 0], inside[taken == 1]]
+            left, right = (tree.add(self.rows, part) for part in parts)
+            tree.children[node] = (left, right)
+            self._todo += [(right, parts[1], level + 1), (left, parts[0], level + 1)]
+        self._todo = waiting
+        return tree
 
 
 @dataclass(frozen=True)

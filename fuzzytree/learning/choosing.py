@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.binary import BinaryTree, grown, limited, pruning
+from fuzzytree.learning.binary import BinaryTree, GrowingTree, limited, pruning
 from fuzzytree.learning.nodes import SplitRules
 from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.sampling import hashed
@@ -71,7 +71,7 @@ def chosen_tree(
     trials: list[_Trial] = []
     for number, style in enumerate(styles if folds else ()):
         progress("choosing", number / len(styles))
-        trees = [grown(rows, fold.learnt, rules, style, depth) for fold in folds]
+        trees = [GrowingTree(rows, fold.learnt, rules, style, depth) for fold in folds]
         trials.append(_best_size(rows, settings, folds, style, trees, rules.min_rows))
     best = max(trials, key=lambda trial: trial.score) if trials else None
     if best is not None and best.style != "columns":
@@ -82,15 +82,18 @@ def chosen_tree(
             best = further
     progress("growing", 0.0)
     at = np.arange(rows.size)
-    style = styles[0] if best is None else best.style
-    tree = grown(
-        rows, at, rules, style, depth, lambda share: progress("growing", share)
+    style, cost = styles[0], 0.0
+    if best is not None:
+        style, cost = best.style, best.cost
+    elif len(np.unique(rows.codes)) > _MANY_CLASSES:
+        cost = _COST_OF_MANY
+    tree = GrowingTree(rows, at, rules, style, depth).grown(
+        cost, lambda share: progress("growing", share)
     )
+    tree = _pruned(tree, settings, cost)
     if best is None:
-        many = len(np.unique(rows.codes)) > _MANY_CLASSES
-        tree = _pruned(tree, settings, _COST_OF_MANY if many else 0.0)
         return ChosenTree(tree, style, None)
-    soft = SoftTree.of(_pruned(tree, settings, best.cost), rows, at)
+    soft = SoftTree.of(tree, rows, at)
     tree = soft.tuned(best.penalty).crisp(rules.min_rows)
     return ChosenTree(tree, style, best.accuracy, best.further_rows(rows, folds))
 
@@ -214,7 +217,7 @@ def _best_size(
     settings: LearningSettings,
     folds: list[Fold],
     style: Style,
-    trees: list[BinaryTree],
+    trees: list[GrowingTree],
     min_rows: int,
 ) -> _Trial:
     """Return the smallest trees that are as good as the best.
@@ -225,7 +228,7 @@ def _best_size(
     leaves: list[int] = []
     best = 0
     for cost in _COSTS:
-        pruned = [_pruned(tree, settings, cost) for tree in trees]
+        pruned = [_pruned(tree.grown(cost), settings, cost) for tree in trees]
         sizes = [tree.leaves for tree in pruned]
         if sizes == leaves:
             continue

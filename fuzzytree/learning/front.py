@@ -7,7 +7,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from fuzzytree.learning.binary import grown, limited
+from fuzzytree.learning.binary import GrowingTree, limited
 from fuzzytree.learning.choosing import Fold, folds_of_rows
 from fuzzytree.learning.nodes import SplitRules
 from fuzzytree.learning.rows import TrainingRows
@@ -20,6 +20,7 @@ LEAVES = (2, 3, 4, 5, 6, 8, 10, 12, 16, 20)
 """Numbers of leaves that are shown."""
 
 _COLUMNS = (1, 2, 3)
+_COST = 1.0  # nodes with so few wrong rows are not split
 
 
 class Front(Result, msgspec.Struct, frozen=True):
@@ -91,7 +92,8 @@ def _right(
     leaves: tuple[int, ...],
 ) -> FloatArray:
     """Return the weight of right answers in a fold, by the number of leaves."""
-    tree = grown(rows, fold.learnt, rules, style, settings.depth or rows.size)
+    depth = settings.depth or rows.size
+    tree = GrowingTree(rows, fold.learnt, rules, style, depth).grown(_COST)
     ends = limited(tree, leaves[-1])
     found = np.zeros(len(leaves))
     for place, most in enumerate(leaves):

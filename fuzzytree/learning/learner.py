@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import numpy.typing as npt
+from threadpoolctl import threadpool_limits
 
 from fuzzytree.cells import checked_weights, numbers_only, unmasked
 from fuzzytree.errors import LearningError
@@ -385,7 +386,8 @@ class ArrayLearner:
     def _default(self, ready: _Ready, progress: Progress) -> _Grown:
         """Grow a tree from the rows' own classes."""
         rows, rules = self._rules(ready)
-        choice = chosen_tree(rows, rules, self.settings, progress)
+        with threadpool_limits(1, "blas"):  # the tables are small: threads would wait
+            choice = chosen_tree(rows, rules, self.settings, progress)
         found = finished_tree(choice.tree, rows, ready.sample, ready.moments)
         codes = ready.sample.codes
         supports = self._rows_by_class(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.learning import LearningSettings, learn_arrays
-from fuzzytree.learning.binary import BinaryTree, grown
+from fuzzytree.learning.binary import BinaryTree, GrowingTree
 from fuzzytree.learning.learner import ArrayLearner
 from fuzzytree.learning.nodes import SplitRules
 from fuzzytree.learning.rows import TrainingRows
@@ -35,7 +35,8 @@ def _grown(values: FloatArray, labels: IntArray) -> tuple[BinaryTree, TrainingRo
     learner.partial_fit(values, labels)
     rows, rules = learner._rules(learner._prepared())
     assert isinstance(rules, SplitRules)
-    return grown(rows, np.arange(rows.size), rules, "mixed", 4), rows
+    at = np.arange(rows.size)
+    return GrowingTree(rows, at, rules, "mixed", 4).grown(0.0), rows
 
 
 def test_the_gradient_is_that_of_the_loss() -> None:
