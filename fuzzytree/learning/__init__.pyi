@@ -1,8 +1,8 @@
+from .choosing import Front as Front
 from .filling import codes_of_positions as codes_of_positions
 from .findings import LearningReport as LearningReport
 from .findings import refuse_measurements as refuse_measurements
 from .findings import remarks as remarks
-from .front import Front as Front
 from .importance import importances as importances
 from .learner import ArrayLearner as ArrayLearner
 from .learner import Learnt as Learnt
@@ -16,10 +16,10 @@ from .parts import open_state as open_state
 from .parts import read_or_collect as read_or_collect
 from .parts import refuse_repeated as refuse_repeated
 from .parts import state_content as state_content
+from .sampling import class_weights as class_weights
 from .settings import ClassWeight as ClassWeight
 from .settings import LearningSettings as LearningSettings
 from .settings import SettingArguments as SettingArguments
 from .settings import refuse_unknown as refuse_unknown
 from .settings import settings_of as settings_of
 from .statistics import rows_beyond as rows_beyond
-from .weights import class_weights as class_weights

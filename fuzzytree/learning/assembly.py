@@ -15,11 +15,11 @@ from fuzzytree.learning.shapes import (
     FittedSets,
     SetRepairs,
     fitted_sets,
+    window_counts,
 )
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.learning.sums import Totals, totals_of
 from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray
-from fuzzytree.learning.windows import window_counts
 from fuzzytree.model import (
     LR,
     Band,

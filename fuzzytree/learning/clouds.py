@@ -18,8 +18,7 @@ from fuzzytree.learning.directions import (
     shrunk,
     spread_of,
 )
-from fuzzytree.learning.nodes import Chosen, Clouds, SplitRules, best_cut
-from fuzzytree.learning.rows import TrainingRows
+from fuzzytree.learning.rows import Chosen, Clouds, SplitRules, TrainingRows, best_cut
 from fuzzytree.learning.sampling import hashed
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
 

@@ -13,8 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from fuzzytree.learning.cuts import SplitAxis, rounded_to
-from fuzzytree.learning.nodes import Chosen, SplitRules
-from fuzzytree.learning.rows import TrainingRows
+from fuzzytree.learning.rows import Chosen, SplitRules, TrainingRows
 from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
 
 MOST_COLUMNS = 64

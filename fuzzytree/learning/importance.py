@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fuzzytree.learning.nodes import information
+from fuzzytree.learning.rows import information
 from fuzzytree.model import FuzzyTree, Variable
 
 

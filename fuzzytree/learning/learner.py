@@ -14,7 +14,8 @@ from threadpoolctl import threadpool_limits
 from fuzzytree.cells import checked_weights, numbers_only, unmasked
 from fuzzytree.errors import LearningError
 from fuzzytree.learning.assembly import AssembledTree, TermNames, assembled
-from fuzzytree.learning.choosing import chosen_tree
+from fuzzytree.learning.binary import finished_tree
+from fuzzytree.learning.choosing import Front, chosen_tree, front_of
 from fuzzytree.learning.cuts import Sketch
 from fuzzytree.learning.filling import (
     FilledStatistics,
@@ -23,24 +24,21 @@ from fuzzytree.learning.filling import (
     filled,
 )
 from fuzzytree.learning.findings import LearningReport
-from fuzzytree.learning.finishing import finished_tree
-from fuzzytree.learning.front import Front, front_of
-from fuzzytree.learning.nodes import SplitRules
 from fuzzytree.learning.paper import GrowthRules, grow
 from fuzzytree.learning.patterns import Patterns, usable_features, wanted_patterns
 from fuzzytree.learning.probabilities import with_probabilities
-from fuzzytree.learning.rows import TrainingRows
-from fuzzytree.learning.sampling import Sample
+from fuzzytree.learning.rows import SplitRules, TrainingRows
+from fuzzytree.learning.sampling import (
+    MOST_COPIES,
+    RowWeights,
+    Sample,
+    class_weights,
+    row_weights,
+)
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.tuning import SHARPNESS
 from fuzzytree.learning.units import FloatArray, IntArray, tallied
-from fuzzytree.learning.weights import (
-    MOST_COPIES,
-    RowWeights,
-    class_weights,
-    row_weights,
-)
 from fuzzytree.model import FuzzyTree, text_fault
 
 Progress = Callable[[str, float], None]
@@ -95,7 +93,7 @@ def learn_arrays(
         categories: Of columns of text, by name; their values are positions. The tree
             may have them in another order.
         ordered: The columns whose categories keep their order.
-        weights: Of the rows (see `fuzzytree.learning.weights`); all 1 unless given.
+        weights: Of the rows (see `fuzzytree.learning.sampling`); all 1 unless given.
         progress: Called with what is being done and its share done, 0 to 1.
 
     Raises:

@@ -17,16 +17,16 @@ import numpy as np
 from fuzzytree.learning.clouds import class_groups, parted_clouds
 from fuzzytree.learning.cuts import SplitAxis, TreeSplit, single
 from fuzzytree.learning.directions import axis_towards, logistic_cut
-from fuzzytree.learning.nodes import (
+from fuzzytree.learning.rows import (
     DIGITS,
     Chosen,
     Clouds,
     SplitRules,
+    TrainingRows,
     best_cut,
     between,
     information,
 )
-from fuzzytree.learning.rows import TrainingRows
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, tallied
 
 Style = Literal["columns", "mixed", "centres"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fuzzytree.learning.induction import components, most_powerful, threshold
+from fuzzytree.learning.paper import components, most_powerful, threshold
 from fuzzytree.learning.units import FloatArray
 
 

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from fuzzytree.learning.induction import components, most_powerful, threshold
-from fuzzytree.learning.shapes import fitted_sets
+from fuzzytree.learning.paper import components, most_powerful, threshold
+from fuzzytree.learning.shapes import fitted_sets, window_counts
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.learning.sums import Totals
-from fuzzytree.learning.windows import window_counts
 
 
 def test_the_threshold_is_the_mean_spread_times_half_the_levels_left() -> None:

@@ -10,8 +10,7 @@ import pytest
 from fuzzytree.learning import LearningSettings, learn_arrays
 from fuzzytree.learning.binary import BinaryTree, GrowingTree
 from fuzzytree.learning.learner import ArrayLearner
-from fuzzytree.learning.nodes import SplitRules
-from fuzzytree.learning.rows import TrainingRows
+from fuzzytree.learning.rows import SplitRules, TrainingRows
 from fuzzytree.learning.tuning import SHARPNESS, SoftTree
 from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.model import Band

@@ -9,8 +9,8 @@ import pytest
 from sklearn.datasets import load_breast_cancer, load_iris
 
 from fuzzytree.learning.learner import ArrayLearner, learn_arrays
+from fuzzytree.learning.sampling import MOST_COPIES, row_weights
 from fuzzytree.learning.settings import LearningSettings
-from fuzzytree.learning.weights import MOST_COPIES, row_weights
 
 if TYPE_CHECKING:
     from fuzzytree.learning.learner import Learnt

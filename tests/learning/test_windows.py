@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fuzzytree.learning.shapes import window_counts
 from fuzzytree.learning.sums import totals_of
 from fuzzytree.learning.units import FloatArray
-from fuzzytree.learning.windows import window_counts
 
 
 def counted(values: list[float] | FloatArray, n: int) -> list[int]:

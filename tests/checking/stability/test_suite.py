@@ -17,8 +17,8 @@ from fuzzytree.checking.stability.results import TITLES, Stability
 from fuzzytree.checking.stability.sensitivity import stiffness
 from fuzzytree.checking.stability.suite import examine
 from fuzzytree.exporters.table import all_formats
+from fuzzytree.learning.shapes import window_counts as counted
 from fuzzytree.learning.sums import totals_of
-from fuzzytree.learning.windows import window_counts as counted
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import (
     LR,
