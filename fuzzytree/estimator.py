@@ -406,7 +406,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             ValueError: If X does not fit the table of `fit`, or a value is so large
                 that a combination of columns overflows.
         """
-        return self.classes_[rule_codes(self.tree_)[self._rules(X)]]
+        rules = self._rules(X)
+        return self.classes_[rule_codes(self.tree_)[rules]]
 
     def apply(self, X: npt.ArrayLike) -> IntArray:
         """Return the number of the leaf of each row, as scikit-learn's trees do.

@@ -352,7 +352,7 @@ KINDS: Final = {
         _learned("p,q r,s,class", _blobs, "--columns-per-node", "1"),
     ),
     "tree categories": Model(
-        "a tree with categories", _learned("colour,size,class", _mixed)
+        "a tree with categories", _learned("colour,size,class", _mixed, *ONE)
     ),
     "tree dates": Model("a tree with dates", _learned("when,size,class", _dated)),
     "tree truths": Model("a tree of truth values", _learned("p,class", _truths)),
@@ -386,7 +386,7 @@ KINDS: Final = {
     ),
     "rules mixed": Model(
         "the relative rules of a tree with categories",
-        _learned("colour,size,class", _mixed, "--no-test", rules=("--as", "rules")),
+        _learned("colour,size,class", _mixed, *ONE, rules=("--as", "rules")),
     ),
     "rules hand": Model("rules by hand", _text("model.yaml", RULES)),
     "rules categories": Model(
