@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -125,7 +124,9 @@ class GrowingTree:
     style: Style
     depth: int
     tree: BinaryTree = field(default_factory=BinaryTree)
-    _todo: list[tuple[int, IntArray, int]] = field(default_factory=list[Any])
+    _todo: list[tuple[int, IntArray, int]] = field(
+        default_factory=list[tuple[int, IntArray, int]]
+    )
     _whole: Clouds | None = None
 
     def __post_init__(self) -> None:
@@ -205,6 +206,16 @@ def pruning(tree: BinaryTree, costs: FloatArray) -> Pruning:
     return Pruning(ends, leaves[0])
 
 
+def pruned(tree: BinaryTree, cost: float) -> BinaryTree:
+    """Return a tree pruned by the cost of a leaf.
+
+    The split at the root stays, so that there is a question at all.
+    """
+    ends = pruning(tree, np.array([cost])).ends[:, 0]
+    ends[0] = False
+    return tree.kept(ends)
+
+
 def limited(tree: BinaryTree, most: int) -> list[BoolArray]:
     """Return which nodes become leaves in the best trees of 1, 2, ... `most` leaves.
 
@@ -273,7 +284,6 @@ def finished_tree(
         moments: Of the classes.
     """
     sketch = Sketch()
-    inside: list[IntArray] = []  # the rows of each node
     leaves = np.zeros(rows.size, np.int64)
     todo = [(0, np.arange(rows.size), -1, 0)]
     while todo:
@@ -289,7 +299,6 @@ def finished_tree(
             placed = _placed(joined, rows, at)
             sketch.splits.append(placed)
             sketch.children.append([0] * len(below))
-            inside.append(at)
             taken = placed.branches(rows.values[at])
             for k in reversed(range(len(below))):
                 todo.append((below[k], at[taken == k], place, k))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from fuzzytree.learning.binary import BinaryTree, GrowingTree, limited, pruning
+from fuzzytree.learning.binary import BinaryTree, GrowingTree, limited, pruned
 from fuzzytree.learning.rows import SplitRules, TrainingRows
 from fuzzytree.learning.sampling import hashed
 from fuzzytree.learning.settings import LearningSettings
@@ -230,12 +230,12 @@ def _best_size(
     leaves: list[int] = []
     best = 0
     for cost in _COSTS:
-        pruned = [_pruned(tree.grown(cost), settings, cost) for tree in trees]
-        sizes = [tree.leaves for tree in pruned]
+        smaller = [_pruned(tree.grown(cost), settings, cost) for tree in trees]
+        sizes = [tree.leaves for tree in smaller]
         if sizes == leaves:
             continue
         leaves = sizes
-        trial = _tried(rows, folds, style, cost, pruned, _LOOSE, min_rows)
+        trial = _tried(rows, folds, style, cost, smaller, _LOOSE, min_rows)
         trials.append(trial)
         if trial.score > trials[best].score:
             best = len(trials) - 1
@@ -289,13 +289,8 @@ def _log_losses(tree: BinaryTree, rows: TrainingRows, fold: Fold) -> FloatArray:
 
 
 def _pruned(tree: BinaryTree, settings: LearningSettings, cost: float) -> BinaryTree:
-    """Return a tree pruned by the cost of a leaf and by the most leaves.
-
-    The split at the root stays, so that there is a question at all.
-    """
-    ends = pruning(tree, np.array([cost])).ends[:, 0]
-    ends[0] = False
-    tree = tree.kept(ends)
+    """Return a tree pruned by the cost of a leaf and by the most leaves."""
+    tree = pruned(tree, cost)
     if settings.leaves is not None and tree.leaves > settings.leaves:
         tree = tree.kept(limited(tree, settings.leaves)[-1])
     return tree

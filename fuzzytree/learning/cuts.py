@@ -370,6 +370,11 @@ class Sketch:
     leaves: list[IntArray] = field(default_factory=list[IntArray])
     leaf_classes: list[int] = field(default_factory=list[int])
 
+    @property
+    def is_tuned(self) -> bool:
+        """Whether a split has flanks of its own, from tuning."""
+        return any(split.flanks is not None for split in self.splits)
+
     def descend(self, rows: FloatArray, start: int = 0) -> IntArray:
         """Return the leaf that each row reaches from a node (or from ~leaf)."""
         leaves = np.zeros(len(rows), np.int64)

@@ -264,14 +264,13 @@ class ArrayLearner:
         )
         progress("fitting sets", 1.0)
         places = {name: place for place, name in enumerate(self.columns)}
-        is_tuned = any(split.flanks is not None for split in grown.sketch.splits)
         tree = with_probabilities(
             made.tree,
             sample,
             ready.weights,
             places,
             further_rows=grown.further_rows,
-            sharpness=SHARPNESS if is_tuned else None,
+            sharpness=SHARPNESS if grown.sketch.is_tuned else None,
         )
         if self.settings.mode != "paper":
             tree = described(tree, self.columns, ready.table, self.statistics)
@@ -289,7 +288,8 @@ class ArrayLearner:
         """
         rows, rules = self._rules(self._prepared())
         every = replace(rules, columns=len(self.columns))
-        return front_of(rows, every, self.settings)
+        with threadpool_limits(1, "blas"):
+            return front_of(rows, every, self.settings)
 
     def _prepared(self) -> _Ready:
         """Return what a tree is grown from."""
@@ -391,8 +391,7 @@ class ArrayLearner:
         supports = self._rows_by_class(
             found.sketch, found.leaves, codes, ready.supports
         )
-        is_tuned = any(split.flanks is not None for split in found.sketch.splits)
-        together = ", tuned together" if is_tuned else ""
+        together = ", tuned together" if found.sketch.is_tuned else ""
         facts: dict[str, Any] = {
             "chosen": {"splits": _STYLES[choice.style] + together},
             "inner_accuracy": choice.accuracy,

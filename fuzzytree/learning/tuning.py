@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fuzzytree.learning.binary import BinaryTree, pruning
+from fuzzytree.learning.binary import BinaryTree, pruned
 from fuzzytree.learning.cuts import TreeSplit, single
 from fuzzytree.learning.directions import axis_of, spread_of
 from fuzzytree.learning.rows import TrainingRows
@@ -48,12 +48,14 @@ class _Seen:
         points: In standard units, shape (rows, combinable columns).
         codes: Their classes.
         weights: How many rows of the table each stands for.
+        starts: Where each class begins.
         cuts: Their branches in gates that stay cuts, by the place of the gate.
     """
 
     points: FloatArray
     codes: IntArray
     weights: FloatArray
+    starts: IntArray
     cuts: dict[int, FloatArray]
 
 
@@ -66,6 +68,7 @@ class SoftTree:
         rows: To learn from.
         at: Those that it was grown from, ordered by class.
         nodes: The nodes with a split, parents before children.
+        below: The nodes of their two branches, shape (gates, 2).
         leaves: The others.
         weights: Of the gates over the combinable columns, shape (gates, columns).
         offsets: Of the gates.
@@ -78,6 +81,7 @@ class SoftTree:
     rows: TrainingRows
     at: IntArray
     nodes: IntArray
+    below: IntArray
     leaves: IntArray
     weights: FloatArray
     offsets: FloatArray
@@ -90,6 +94,7 @@ class SoftTree:
         """Read a tree that was grown from some rows, ordered by class."""
         is_leaf = np.array([split is None for split in tree.splits])
         nodes, leaves = np.flatnonzero(~is_leaf), np.flatnonzero(is_leaf)
+        below = np.array([tree.children[node] for node in nodes.tolist()])
         reached = tree.reaching(rows, at)
         weights = np.zeros((len(nodes), len(rows.combinable)))
         offsets = np.zeros(len(nodes))
@@ -107,7 +112,7 @@ class SoftTree:
             counts[place] += tallied(codes, sizes, rows.classes)
         shares = counts / counts.sum(axis=1, keepdims=True)
         return SoftTree(
-            tree, rows, at, nodes, leaves, weights, offsets, is_free, shares
+            tree, rows, at, nodes, below, leaves, weights, offsets, is_free, shares
         )
 
     def tuned(self, penalty: float) -> SoftTree:
@@ -155,9 +160,7 @@ class SoftTree:
         result = _labelled(moved, self.rows, self.at, min_rows)
         if result.splits[0] is None:
             return self.tree
-        ends = pruning(result, np.zeros(1)).ends[:, 0]
-        ends[0] = False
-        return result.kept(ends)
+        return pruned(result, 0.0)
 
     def _seen(self, at: IntArray) -> _Seen:
         """Return what the tree sees of some rows."""
@@ -168,7 +171,9 @@ class SoftTree:
             .astype(np.float64)
             for place in np.flatnonzero(~self.is_free.any(axis=1)).tolist()
         }
-        return _Seen(rows.standard[at], rows.codes[at], rows.weights[at], cuts)
+        codes = rows.codes[at]
+        starts = np.flatnonzero(np.diff(codes, prepend=-1))
+        return _Seen(rows.standard[at], codes, rows.weights[at], starts, cuts)
 
     def _gates(
         self, weights: FloatArray, offsets: FloatArray, seen: _Seen
@@ -183,8 +188,8 @@ class SoftTree:
     def _reach(self, gates: FloatArray) -> FloatArray:
         """Return how far each row reaches each node, shape (nodes, rows)."""
         reach = np.ones((len(self.tree.splits), gates.shape[1]))
-        for gate, node in zip(gates, self.nodes.tolist(), strict=True):
-            left, right = self.tree.children[node]
+        forks = zip(self.nodes.tolist(), self.below.tolist(), gates, strict=True)
+        for node, (left, right), gate in forks:
             np.multiply(reach[node], gate, out=reach[right])
             np.subtract(reach[node], reach[right], out=reach[left])
         return reach
@@ -203,25 +208,24 @@ class SoftTree:
         self, point: FloatArray, seen: _Seen, penalty: float
     ) -> tuple[float, FloatArray]:
         """Return the penalised log-loss of some rows, and its gradient."""
-        children, classes = self.tree.children, self.rows.classes
+        classes = self.rows.classes
         weights, offsets, shares = self._parts(point)
         gates = self._gates(weights, offsets, seen)
         reach = self._reach(gates)
         likely = np.empty_like(reach)  # the chance of a row's class from a node on
         likely[self.leaves] = shares[:, seen.codes]
-        for gate, node in zip(gates[::-1], self.nodes[::-1].tolist(), strict=True):
-            left, right = children[node]
+        forks = zip(self.nodes.tolist(), self.below.tolist(), gates, strict=True)
+        for node, (left, right), gate in reversed([*forks]):
             likely[node] = likely[left] + gate * (likely[right] - likely[left])
         whole = np.maximum(likely[0], _LEAST)
         scale = seen.weights / whole
-        below = np.array([children[node] for node in self.nodes.tolist()])
-        steep = likely[below[:, 0]] - likely[below[:, 1]]
+        steep = likely[self.below[:, 0]] - likely[self.below[:, 1]]
         steep *= reach[self.nodes] * gates * (1.0 - gates) * scale
         owned = reach[self.leaves] * likely[self.leaves] * scale
-        starts = np.flatnonzero(np.diff(seen.codes, prepend=-1))
         of_shares = shares * (owned.sum(axis=1, keepdims=True) + _EVEN_ROWS)
         of_shares -= _EVEN_ROWS / classes
-        of_shares[:, seen.codes[starts]] -= np.add.reduceat(owned, starts, axis=1)
+        of_class = np.add.reduceat(owned, seen.starts, axis=1)
+        of_shares[:, seen.codes[seen.starts]] -= of_class
         even = np.log(np.maximum(shares, _SMALLEST)).sum() * _EVEN_ROWS / classes
         lengths = np.maximum(np.sqrt((self.weights**2).sum(axis=1)), _LEAST)
         away = (weights - self.weights) / lengths[:, None]
