@@ -29,11 +29,10 @@ from fuzzytree.model import (
     depth,
     label_type_of,
     leaf_paths,
-    remember,
     with_label_type,
 )
 from fuzzytree.report import Picture, draw_model
-from fuzzytree.runtimes import baseline, mix, rule_codes
+from fuzzytree.runtimes import baseline, mix, rule_codes, run_of
 from fuzzytree.semantics import Status, rules_of
 from fuzzytree.tables import TableSource, batches, read_table
 
@@ -424,9 +423,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return numbers
 
     def _rules(self, X: npt.ArrayLike) -> IntArray:
-        values, tree = self._values(X), self.tree_
-        run = remember(tree, ("native", True, False), lambda: baseline().load(tree))
-        return self._answers(values, run).rule
+        values = self._values(X)
+        return self._answers(values, run_of(self.tree_, baseline())).rule
 
     def predict_proba(self, X: npt.ArrayLike) -> FloatArray:
         """Return the probability of each class, as the tree's leaves have it.
@@ -447,8 +445,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 f"a tree of {len(self.tree_.leaves)} leaves and {len(self.classes_)} "
                 "classes has no probabilities: there are too many for a model"
             )
-        rules = rules_of(self.tree_)
-        run = remember(rules, "mix", lambda: mix(rules))
+        run = mix(rules_of(self.tree_))
         mixed = self._answers(values, run).probabilities
         assert mixed is not None  # the tree has a sharpness
         return np.ascontiguousarray(mixed.T)

@@ -27,7 +27,6 @@ from fuzzytree.model import (
     Runtime,
     Variable,
     kind_of,
-    remember,
 )
 from fuzzytree.runtimes import (
     OnnxModel,
@@ -43,6 +42,7 @@ from fuzzytree.runtimes import (
     open_onnx,
     outputs_of,
     rules_only,
+    run_of,
 )
 from fuzzytree.semantics import rules_of
 from fuzzytree.tables import Batch, TableSource, batches, in_order
@@ -234,19 +234,17 @@ def prepare_answering(
         model = _rated(model)
     if isinstance(model, OnnxModel):
         return _answering_onnx(model, runtime, with_strengths=with_strengths)
+    is_mixed = with_probabilities and not with_strengths
     is_short = not (with_strengths or with_probabilities)
     if is_short and runtime is None and kind_of(model) in find_runtime(_SHORT).runs:
         runtime = _SHORT
     used = _runtime(runtime or baseline().name, model)
-
-    key = used.name, with_strengths, with_probabilities
-
-    def load() -> Run:
-        if key == (baseline().name, False, True):
-            return mix(rules_only(model, used.name, "mixes"))
-        return used.load(model, with_strengths=with_strengths or with_probabilities)
-
-    execute = remember(model, key, load) if used.is_reentrant else load()
+    execute: Run
+    if is_mixed and used == baseline():
+        execute = mix(rules_only(model, used.name, "mixes"))
+    else:
+        fires = with_strengths or with_probabilities
+        execute = run_of(model, used, with_strengths=fires)
 
     def answer(values: FloatArray) -> Predictions | Outputs:
         outcome = execute(np.ascontiguousarray(values))

@@ -38,6 +38,7 @@ from .table import find_runtime as find_runtime
 from .table import is_installed as is_installed
 from .table import needed_by as needed_by
 from .table import rules_only as rules_only
+from .table import run_of as run_of
 from .written import ENGINES as ENGINES
 from .written import Options as Options
 from .written import ProgramOutcome as ProgramOutcome

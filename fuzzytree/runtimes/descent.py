@@ -5,6 +5,9 @@ top, which nearly every row meets, are evaluated on all rows at once and joined 
 one-byte result, with one wide comparison and at most three byte operations each. The
 rows that are not at a leaf by then walk on together, one test a round, and leave the
 walk when they arrive. A single row is walked in plain Python.
+
+Of a tree with many combinations a row meets few: there each node computes its own
+variable, and only in the rows that reach it.
 """
 
 from __future__ import annotations
@@ -25,9 +28,12 @@ from fuzzytree.runtimes.rows import (
     Chains,
     axis_lines,
     axis_row,
+    axis_values,
     chain_value,
     checked,
+    input_lines,
     input_row,
+    known_rows,
     missing_rows,
     plan_axes,
 )
@@ -43,6 +49,8 @@ _SMALL = 24  # tests up to which all of them are evaluated on all rows
 _SHARE = 0.05  # of the leaves: what a test at the top must decide to pay
 _MOST_EXITS = 255
 _LIVE = 0.6  # share of rows still walking below which the others leave
+_FEW_CHAINS = 32  # combinations up to which all of them are computed in all rows
+_NODE_COST = 12_000  # of a visit to a node, in parts of a combination of one row
 CHUNK = 1 << 16
 """Rows that go through together: their values and answers stay in the cache."""
 
@@ -305,6 +313,32 @@ def descend_rows(
     descent.walk.leaf.take(here, out=out, mode="clip")
 
 
+def descend_nodes(
+    axes: Axes, splits: Sequence[AxisSplit], inputs: Reals, out: IntArray
+) -> None:
+    """Write the number of the leaf of each row, node by node, in double.
+
+    `inputs` has shape (inputs, rows). A variable is computed in the rows that reach a
+    test of it.
+    """
+    todo = [(0 if splits else -1, np.arange(len(out)))]
+    while todo:
+        number, rows = todo.pop()
+        if number < 0:
+            out[rows] = -number
+        elif len(rows):
+            split = splits[number]
+            values = axis_values(axes, inputs, split.line, rows)
+            if len(split.cuts) == 1:
+                is_above = values > split.cuts[0]
+                todo += zip(
+                    split.targets, (rows[~is_above], rows[is_above]), strict=True
+                )
+                continue
+            ends = np.take(split.targets, np.searchsorted(split.cuts, values))
+            todo += [(end, rows[ends == end]) for end in dict.fromkeys(split.targets)]
+
+
 def _test_top(top: Sequence[CutTest], lines: Reals) -> Bytes:
     """Return a byte for each row: which exit of the top it takes."""
     rows = lines.shape[1]
@@ -429,12 +463,16 @@ def follow(tree: FuzzyTree, dtype: Dtype = "float64") -> Run:
 
 def descend_by(axes: Axes, descent: Descent, inputs: tuple[str, ...]) -> Run:
     """Return a function that descends planned splits on planned axes."""
-    is_plain = not axes.steps and axes.dtype == np.float64 and axes.stand_ins is None
+    is_double = axes.dtype == np.float64
+    is_plain = not axes.steps and is_double and axes.stand_ins is None
+    parts, fewest = sum(map(len, axes.chains)), math.inf
+    if is_double and len(axes.chains) > _FEW_CHAINS:
+        fewest = _NODE_COST * len(descent.splits) / parts
 
     def run(values: FloatArray) -> Outcome:
         array = checked(values, inputs)
         count = array.shape[1]
-        if count == 1 and axes.dtype == np.float64:
+        if count == 1 and is_double:
             return _one(axes, descent.splits, array[:, 0].tolist())
         rule = np.empty(count, np.int64)
         status = np.zeros(count, np.int64)
@@ -444,11 +482,15 @@ def descend_by(axes: Axes, descent: Descent, inputs: tuple[str, ...]) -> Run:
                 part = slice(start, start + CHUNK)
                 if is_plain and array.flags.c_contiguous:
                     descend_rows(descent, array, start, rule[part], desk)
-                    lines = array[:, part]
+                    missing = missing_rows(array[:, part])
+                elif len(rule[part]) >= fewest:
+                    lines = input_lines(axes, array[:, part])
+                    descend_nodes(axes, descent.splits, lines, rule[part])
+                    missing = ~known_rows(axes, array[:, part])
                 else:
                     lines = np.ascontiguousarray(axis_lines(axes, array[:, part]))
                     descend_rows(descent, lines, 0, rule[part], desk)
-                missing = missing_rows(lines)
+                    missing = missing_rows(lines)
                 if missing is not None:
                     rule[part][missing] = 0
                     status[part][missing] = 3

@@ -125,9 +125,10 @@ def _parts(rules: Model) -> FloatArray:
 def mix(rules: RuleBase) -> Run:
     """Return a function that gives the rule and the probabilities of each row.
 
-    They have the bits that `class_probabilities` makes of all strengths. All rules are
-    fired if that takes less time: on few rows, or of few rules; or if their beginnings
-    do not divide the inputs, as those of a tree do.
+    It is made once for a rule base. The probabilities have the bits that
+    `class_probabilities` makes of all strengths. All rules are fired if that takes less
+    time: on few rows, or of few rules; or if their beginnings do not divide the inputs,
+    as those of a tree do.
 
     Returns:
         A function from values of shape (inputs, rows) to an outcome without strengths.
@@ -140,6 +141,10 @@ def mix(rules: RuleBase) -> Run:
         >>> outcome.probabilities.sum(axis=0).round(12).tolist()
         [1.0]
     """
+    return remember(rules, "mix", lambda: _plan_mixture(rules))
+
+
+def _plan_mixture(rules: RuleBase) -> Run:
     plan = plan_rules(rules)
     fired = fire_plan(plan, rules.inputs)
     fewest = _FEWEST if firing_cost(plan) >= _LEAST_COST else math.inf

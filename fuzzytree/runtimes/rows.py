@@ -239,13 +239,12 @@ def input_lines(axes: Axes, values: FloatArray) -> Reals:
 def axis_values(axes: Axes, inputs: Reals, line: int, rows: IntArray) -> Reals:
     """Return the value of one variable in some rows, given all inputs, in double."""
     if line < axes.inputs:
-        values: Reals = inputs[line].take(rows)
+        values: Reals = inputs[line].take(rows, mode="clip")
         return values
     chain = axes.chains[line - axes.inputs]
-    values = chain_value(
-        chain, {place: inputs[place].take(rows) for place, _, _ in chain}
-    )
-    return values
+    columns = {place: inputs[place].take(rows, mode="clip") for place, _, _ in chain}
+    total: Reals = chain_value(chain, columns)
+    return total
 
 
 def axis_row(axes: Axes, row: list[float]) -> list[float]:

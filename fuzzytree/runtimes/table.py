@@ -14,7 +14,15 @@ import shutil
 from collections.abc import Sequence
 
 from fuzzytree.errors import LossError, install_hint
-from fuzzytree.model import Document, Dtype, RuleBase, Runtime, as_names
+from fuzzytree.model import (
+    Document,
+    Dtype,
+    RuleBase,
+    Run,
+    Runtime,
+    as_names,
+    remember,
+)
 
 TABLE = (
     "fuzzytree.runtimes.reference",
@@ -91,6 +99,22 @@ def needed_by(runtime: Runtime) -> str:
     if runtime.programs:
         return f"one of the programs {', '.join(runtime.programs)}"
     return install_hint(runtime.extra or "")
+
+
+def run_of(model: Document, runtime: Runtime, *, with_strengths: bool = False) -> Run:
+    """Return what executes a model; where threads may share it, it is made once.
+
+    Raises:
+        LossError: If the runtime cannot carry the model.
+    """
+    has_strengths = with_strengths and bool(model.rules)
+
+    def load() -> Run:
+        return runtime.load(model, with_strengths=has_strengths)
+
+    if not runtime.is_reentrant:
+        return load()
+    return remember(model, (runtime.name, has_strengths), load)
 
 
 def rules_only(model: Document, runtime: str, verb: str) -> RuleBase:

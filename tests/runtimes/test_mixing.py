@@ -17,7 +17,7 @@ from fuzzytree.model.rulebase import RuleBase, Semantics
 from fuzzytree.runtimes import mixing
 from fuzzytree.runtimes.mixing import class_probabilities, mix, weights_of
 from fuzzytree.runtimes.native import load
-from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.lowering import rules_from_tree, rules_of
 from fuzzytree.semantics.probing import probe_values
 from fuzzytree.testing import random_tree, rated, with_points
 
@@ -115,6 +115,20 @@ def test_rules_that_divide_no_axis_are_all_fired(walks: list[int], seed: int) ->
     values = edge_values(rules)
     assert_same(mix(rules)(values), all_mixed(rules, values))
     assert not walks
+
+
+def test_the_classifier_and_the_functions_share_what_a_tree_needs() -> None:
+    values = np.random.default_rng(0).normal(size=(60, 2))
+    model = FuzzyTreeClassifier().fit(values, values[:, 0] > 0.0)
+    model.predict(values)
+    model.predict_proba(values)
+    sources = model.tree_, rules_of(model.tree_)
+    before = [dict(vars(source)["_made"]) for source in sources]
+    ft.run(model.tree_, values)
+    ft.run(model.tree_, values, with_strengths=False, with_probabilities=True)
+    for source, kept in zip(sources, before, strict=True):
+        added = set(vars(source)["_made"]) - set(kept)
+        assert added <= {"owners", "rule codes", "parts"}
 
 
 def test_a_large_table_has_the_probabilities_of_its_parts() -> None:

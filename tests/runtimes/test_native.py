@@ -7,6 +7,7 @@ import random
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.model.rulebase import (
@@ -27,6 +28,7 @@ from fuzzytree.runtimes.degrees import DOUBLE, shape_degrees
 from fuzzytree.runtimes.descent import AxisSplit, Desk, descend_row, descend_rows
 from fuzzytree.runtimes.native import load, load_best_first
 from fuzzytree.runtimes.reference import load as load_reference
+from fuzzytree.runtimes.rows import axis_lines, plan_axes
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import degree
 from fuzzytree.testing import random_tree
@@ -247,3 +249,49 @@ def test_best_first_refuses_a_tree() -> None:
         f"cannot run {tree.name} as best-first: it searches rule bases, and this is "
         "a tree\n  pass rules_from_tree(tree)"
     )
+
+
+@pytest.mark.parametrize("leaves", [1, 2, 7, 60, 300])
+def test_rows_on_cuts_of_combinations_descend_node_by_node_alike(leaves: int) -> None:
+    chance = np.random.default_rng(leaves)
+    parts = (Part("x", 0.3, 0.1), Part("y", -1.7, 0.7), Part("z", 1.1, -3.0))
+    mixed = (Variable("a", parts=parts), Variable("b", parts=parts[1:]))
+    axes = plan_axes([*map(Variable, "xyz"), *mixed])
+    values = chance.normal(size=(3, 2000))
+    lines = axis_lines(axes, values)
+    splits = [
+        AxisSplit(
+            2 + split.line,
+            tuple(np.sort(chance.choice(lines[2 + split.line], len(split.cuts)))),
+            split.targets,
+        )
+        for split in random_splits(leaves, leaves)
+    ]
+    whole, lazy = np.empty((2, 2000), np.int64)
+    plan = descent.plan_descent(splits, DOUBLE)
+    descend_rows(plan, lines, 0, whole, Desk(2000, DOUBLE))
+    descent.descend_nodes(axes, splits, values, lazy)
+    assert lazy.tolist() == whole.tolist()
+
+
+@pytest.mark.parametrize("size", [1.0, 1e6, 1e300, 1.7e308])
+@pytest.mark.parametrize("leaves", [40, 300])
+def test_missing_and_large_values_change_no_bit_node_by_node(
+    size: float, leaves: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tree = random_tree(leaves, leaves=leaves, inputs=5, combinations=0.9)
+    first, *others = tree.variables
+    tree = replace(tree, variables=(replace(first, missing=0.25), *others))
+    values = np.random.default_rng(leaves).normal(size=(len(tree.inputs), 3000))
+    values = np.clip(values, -1.0, 1.0) * size
+    values[:2, :40] = [[math.nan, math.inf, -math.inf, 5e-324] * 10] * 2
+    values[1, :20] = 0.5
+    monkeypatch.setattr(descent, "_FEW_CHAINS", math.inf)
+    whole = load(tree)(values)
+    monkeypatch.setattr(descent, "_FEW_CHAINS", 0)
+    monkeypatch.setattr(descent, "_NODE_COST", 1)
+    monkeypatch.delattr(descent, "axis_lines")
+    for run in (load(tree), load_best_first(rules_from_tree(tree))):
+        result = run(values)
+        assert result.rule.tolist() == whole.rule.tolist()
+        assert result.status.tolist() == whole.status.tolist()
