@@ -6,7 +6,7 @@ import functools
 import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Self
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Self, cast
 
 import narwhals as nw
 import numpy as np
@@ -26,6 +26,7 @@ from fuzzytree.model import (
     DATE_UNIT,
     PARTS,
     FuzzyTree,
+    RuleBase,
     depth,
     label_type_of,
     leaf_paths,
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 LabelArray = npt.NDArray[np.generic]
 Mode = Literal["default", "paper"]
+Form = Literal["tree", "rules"]
 PatternsPerClass = int | Mapping[str, int] | None
 LabelWeight = Mapping[Any, float] | Literal["balanced"] | None
 
@@ -147,6 +149,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     Args:
         mode: `default`, or `paper` for the paper's algorithm.
+        form: `tree`; or `rules`, one for each class. None: rules of more than 200
+            classes, unless one of the next four limits a tree.
         columns_per_node: How many columns a node looks at, at most; 1 gives rules in
             the table's own words, None as many as help.
         leaves: How many leaves the tree has, at most.
@@ -171,7 +175,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             same tree. `fuzzytree.learning.LearningSettings` says more about each.
 
     Attributes:
-        tree_: The tree, as every other part of fuzzytree takes it.
+        model_: The tree or the rules, as every other part of fuzzytree takes them.
+        tree_: The tree; absent if rules were learnt.
         report_: What learning repaired and counted.
         classes_: The labels, sorted.
         n_features_in_: The number of columns seen in `fit`.
@@ -189,9 +194,10 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     """
 
     mode: Mode
+    form: Form | None
     patterns_per_class: PatternsPerClass
     class_weight: LabelWeight
-    tree_: FuzzyTree
+    model_: FuzzyTree | RuleBase
     report_: LearningReport
     classes_: LabelArray
     n_features_in_: int
@@ -203,6 +209,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         self,
         *,
         mode: Mode = "default",
+        form: Form | None = None,
         columns_per_node: int | None = None,
         leaves: int | None = None,
         min_rows: int | None = None,
@@ -220,6 +227,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         seed: int = 0,
     ) -> None:
         self.mode = mode
+        self.form = form
         self.columns_per_node = columns_per_node
         self.leaves = leaves
         self.min_rows = min_rows
@@ -325,7 +333,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 classifier is a pickle or a copy of a fitted one.
         """
         is_first = not hasattr(self, "_learner")
-        if is_first and hasattr(self, "tree_"):
+        if is_first and hasattr(self, "model_"):
             raise ValueError(
                 "a pickled or copied classifier holds no training rows, so partial_fit "
                 "cannot continue; call fit, or partial_fit on the original"
@@ -394,19 +402,20 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         codes = np.searchsorted(self.classes_, labels)
         self._learner.partial_fit(values, codes, weights=weights)
         learnt = self._learner.finish()
-        self.tree_ = with_label_type(learnt.tree, label_type_of(self.classes_.tolist()))
+        label_type = label_type_of(self.classes_.tolist())
+        self.model_ = with_label_type(learnt.model, label_type)
         self.report_ = learnt.report
         return self
 
     def predict(self, X: npt.ArrayLike) -> LabelArray:
-        """Return the label of each row, by descending the tree.
+        """Return the label of each row, by its leaf or its strongest rule.
 
         Raises:
             ValueError: If X does not fit the table of `fit`, or a value is so large
                 that a combination of columns overflows.
         """
         rules = self._rules(X)
-        return self.classes_[rule_codes(self.tree_)[rules]]
+        return self.classes_[rule_codes(self.model_)[rules]]
 
     def apply(self, X: npt.ArrayLike) -> IntArray:
         """Return the number of the leaf of each row, as scikit-learn's trees do.
@@ -424,7 +433,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     def _rules(self, X: npt.ArrayLike) -> IntArray:
         values = self._values(X)
-        return self._answers(values, run_of(self.tree_, baseline())).rule
+        return self._answers(values, run_of(self.model_, baseline())).rule
 
     def predict_proba(self, X: npt.ArrayLike) -> FloatArray:
         """Return the probability of each class, as the tree's leaves have it.
@@ -440,12 +449,13 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
                 tree has no probabilities.
         """
         values = self._values(X)
-        if not self.tree_.semantics.sharpness:
+        rules = rules_of(self.model_)
+        if not rules.semantics.sharpness:
             raise ValueError(
-                f"a tree of {len(self.tree_.leaves)} leaves and {len(self.classes_)} "
-                "classes has no probabilities: there are too many for a model"
+                f"a model of {len(rules.rules)} rules and {len(self.classes_)} classes "
+                "has no probabilities: there are too many"
             )
-        run = mix(rules_of(self.tree_))
+        run = mix(rules)
         mixed = self._answers(values, run).probabilities
         assert mixed is not None  # the tree has a sharpness
         return np.ascontiguousarray(mixed.T)
@@ -493,6 +503,15 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         check_is_fitted(self)
         shares = importances(self.tree_)
         return np.array([shares[name] for name in self._columns()])
+
+    @property
+    def tree_(self) -> FuzzyTree:
+        """The tree."""
+        model = self.__fuzzytree__()
+        if not model.leaves:
+            text = f"model_ holds rules of {len(model.classes)} classes, and no tree"
+            raise AttributeError(f"{text}; form='tree' learns one")
+        return cast("FuzzyTree", model)  # nothing else has leaves
 
     def get_depth(self) -> int:
         """Return how many conditions lead to the deepest leaf."""
@@ -548,14 +567,14 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         tree = self.__fuzzytree__()
         return draw_model(tree, title=title, row=row, surface=surface)
 
-    def __fuzzytree__(self) -> FuzzyTree:
-        """Return the tree, so that every function of fuzzytree takes the classifier.
+    def __fuzzytree__(self) -> FuzzyTree | RuleBase:
+        """Return the model, so that every function of fuzzytree takes the classifier.
 
         Raises:
             NotFittedError: If the classifier is not fitted.
         """
-        check_is_fitted(self, "tree_")
-        return self.tree_
+        check_is_fitted(self, "model_")
+        return self.model_
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out training rows."""
@@ -575,7 +594,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _values(self, X: npt.ArrayLike) -> FloatArray:
         """Return the columns that the tree needs, shape (inputs, rows)."""
         check_is_fitted(self)
-        frame, tree = _frame_of(X), self.tree_
+        frame, tree = _frame_of(X), self.model_
         variables = [one for one in tree.variables if not one.parts]
         if frame is None:
             rows: Any = _validated(self, X, reset=False, **self._numeric())

@@ -269,7 +269,7 @@ def test_a_row_that_overflows_a_combination_is_named() -> None:
     high = Term("high", Band(low=0.0, left=-1.0))
     twice = Variable("twice", (low, high), parts=(Part("x1", 2.0),))
     ways = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
-    model.tree_ = FuzzyTree(
+    model.model_ = FuzzyTree(
         "tree", ("False", "True"), (Variable("x1"), twice),
         (Node("twice", (0.0,), (0, 1), ways),), (Leaf("False"), Leaf("True")),
     )  # fmt: skip

@@ -26,7 +26,14 @@ from fuzzytree.learning import (
     learn_arrays,
     rows_beyond,
 )
-from fuzzytree.model import USUAL_FLOOR, BoolArray, FloatArray, FuzzyTree, IntArray
+from fuzzytree.model import (
+    USUAL_FLOOR,
+    BoolArray,
+    FloatArray,
+    FuzzyTree,
+    IntArray,
+    RuleBase,
+)
 from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import rules_from_tree
 from fuzzytree.tables import Table
@@ -176,6 +183,8 @@ def accuracy(
         The accuracies; None if the table has fewer than ten rows, or if some fold
         leaves one class to learn from.
     """
+    if settings.learns_rules(len(table.classes)):  # of which a fold may lack some
+        settings = msgspec.structs.replace(settings, form="rules")
     width = max(len(table.columns), 1)
     rows = sampled(table.codes, min(ROWS, CELLS // width), seed)
     if len(rows) < _FEWEST:
@@ -213,8 +222,8 @@ def accuracy(
             ordered=table.ordered,
             weights=None if table.row_weights is None else table.row_weights[kept],
         )
-        values, rules, right = _predicted(table, learnt.tree, test)
-        if groups is not None and learnt.tree.sets:
+        values, rules, right = _predicted(table, learnt.model, test)
+        if groups is not None and learnt.model.sets:
             weak.append(_is_weak(learnt.tree, values, rules))
         weight = None if weights is None else weights[test]
         shares.append(float(np.average(right, weights=weight)))
@@ -249,13 +258,13 @@ def accuracy_of(
     counts = np.bincount(table.codes[rows], minlength=len(table.classes))
     whole = np.bincount(table.codes, _weights(table, settings))
     heavy = whole / np.maximum(counts, 1)
-    right = _predicted(table, learnt.tree, rows)[2]
+    right = _predicted(table, learnt.model, rows)[2]
     share = float(np.average(right, weights=heavy[table.codes[rows]]))
     return Accuracy((share,), len(rows), table.rows, is_of_tree=True)
 
 
 def _predicted(
-    table: Table, tree: FuzzyTree, rows: IntArray
+    table: Table, tree: FuzzyTree | RuleBase, rows: IntArray
 ) -> tuple[FloatArray, IntArray, BoolArray]:
     """Return the inputs of rows, their rules, and which have the class of the row."""
     places = np.array([table.columns.index(k) for k in tree.inputs], np.int64)
@@ -267,7 +276,7 @@ def _predicted(
             moved = np.array([*map(variable.categories.index, own), math.nan])
             row[:] = moved[np.nan_to_num(row, nan=-1.0).astype(np.int64)]
     rules = baseline().load(tree)(values).rule
-    ends = [-1, *(table.classes.index(leaf.label) for leaf in tree.leaves)]
+    ends = [-1, *map(table.classes.index, tree.rule_labels)]
     return values, rules, np.array(ends)[rules] == table.codes[rows]
 
 
@@ -314,10 +323,11 @@ def front(table: Table, settings: LearningSettings) -> Front | None:
         settings: How to learn; limits that it has hold here too.
 
     Returns:
-        The accuracies on rows that were held out; None in paper mode, of a sample, or
-        where the rows are too few to hold some out.
+        The accuracies on rows that were held out; None in paper mode, for rules, of a
+        sample, or where the rows are too few to hold some out.
     """
-    if settings.mode == "paper" or table.weights is not None:
+    is_other = settings.mode == "paper" or settings.form == "rules"
+    if is_other or table.weights is not None:
         return None
     learner = ArrayLearner(
         columns=table.columns,

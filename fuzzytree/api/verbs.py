@@ -101,6 +101,10 @@ def learn(
 ) -> FuzzyTree:
     """Learn a fuzzy tree from a table with a class for each row.
 
+    Of more than 200 classes a `RuleBase` is learnt in its place, a rule for each class:
+    it has the attributes of a tree, empty where they are about nodes and leaves.
+    `form="tree"` or a limit of the tree's size learns a tree.
+
     Args:
         table: A path, a pandas, polars or arrow table, an array of shape
             (rows, columns), or what `fuzzytree.table` returns; or a lazy frame of
@@ -164,13 +168,14 @@ def learn(
     rows = result if isinstance(result, Table) else result.table()
     for column, text in learning.remarks(rows, lambda column: f"ignore=[{column!r}]"):
         warnings.warn(f"{rows.name}: {column} has {text}", stacklevel=2)
-    return learn_table(
+    learnt = learn_table(
         result,
         name=name or printable(stem_of(path_of(table) or "")) or "tree",
         units=units or {},
         settings=chosen,
         progress=progress,
-    ).tree
+    )
+    return cast("FuzzyTree", learnt.model)  # rules have the attributes of a tree
 
 
 def learn_table(
@@ -212,8 +217,8 @@ def learn_table(
         weights=table.row_weights,
         progress=progress,
     )
-    tree = with_label_type(learnt.tree, table.label_type)
-    return msgspec.structs.replace(learnt, tree=tree)
+    model = with_label_type(learnt.model, table.label_type)
+    return msgspec.structs.replace(learnt, model=model)
 
 
 def predict(frame: Frame, model: ModelSource) -> Frame:

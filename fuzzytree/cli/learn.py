@@ -53,7 +53,7 @@ if TYPE_CHECKING:
         LearningSettings,
         Learnt,
     )
-    from fuzzytree.model import FuzzyTree, IntArray
+    from fuzzytree.model import FuzzyTree, IntArray, RuleBase
     from fuzzytree.tables import Table
 
 State = TypeVar("State", "Learner", "LeafCounts")
@@ -100,6 +100,12 @@ class TreeOptions:
         "Learner: the default one, or that of the paper.",
         choices=["default", "paper"],
         default="default",
+    )
+    form: Any = option(
+        "--form",
+        "What to learn: a tree, or a rule for each class; by default rules of more "
+        "than 200 classes.",
+        choices=["tree", "rules"],
     )
     columns_per_node: Any = option(
         "--columns-per-node",
@@ -222,8 +228,8 @@ def command(options: LearnOptions) -> None:
 
 def _learnt(
     options: LearnOptions, *, is_state: bool
-) -> tuple[FuzzyTree, Lines, object]:
-    """Return a tree of all rows, what to say about it, and the facts."""
+) -> tuple[FuzzyTree | RuleBase, Lines, object]:
+    """Return a model of all rows, what to say about it, and the facts."""
     from fuzzytree.api import (
         accuracy,
         accuracy_of,
@@ -260,10 +266,16 @@ def _learnt(
             settings=settings,
             progress=show,
         )
-    tree = learnt.tree
-    size = f"depth {depth(tree)}, {len(tree.inputs)} of {len(tree.columns)} columns"
-    leaves = counted(len(tree.leaves), "leaf", "leaves")
-    rows = [("learnt", leaves, _timed(size, begin)), read]
+    tree = learnt.model
+    size = f"{len(tree.inputs)} of {len(tree.columns)} columns"
+    if tree.leaves:
+        parts = counted(len(tree.leaves), "leaf", "leaves")
+        size = f"depth {depth(tree)}, {size}"
+    else:
+        parts = counted(learnt.report.rules, "rule")
+        why = ", as they are more than 200; --form tree learns a tree"
+        size = f"one for each class{'' if options.form else why}; {size}"
+    rows = [("learnt", parts, _timed(size, begin)), read]
     rows += [("remark", column, f"has {text}") for column, text in noticed.items()]
     if len(tree.leaves) == 1:
         text = f"has one leaf: it predicts {tree.leaves[0].label!r} for every row"
@@ -296,14 +308,14 @@ def _learnt(
         rows.append(_drawn(small, options.front, _title(options)))
     facts = _summary(found, noticed, learnt, tested, settings, options.output)
     facts = msgspec.structs.replace(facts, front=small)
-    return learnt.tree, rows, facts
+    return learnt.model, rows, facts
 
 
 def _with_floor(learnt: Learnt, floor: float) -> Learnt:
     """Return a tree whose semantics state the floor of strengths."""
-    semantics = msgspec.structs.replace(learnt.tree.semantics, floor=floor)
-    tree = msgspec.structs.replace(learnt.tree, semantics=semantics)
-    return msgspec.structs.replace(learnt, tree=tree)
+    semantics = msgspec.structs.replace(learnt.model.semantics, floor=floor)
+    model = msgspec.structs.replace(learnt.model, semantics=semantics)
+    return msgspec.structs.replace(learnt, model=model)
 
 
 def _floor_row(tested: Accuracy) -> tuple[str, str, str]:
@@ -399,7 +411,7 @@ def _counted(
 
 
 def _write(
-    options: LearnOptions, tree: FuzzyTree, rows: Lines, form: Format, *, is_data: bool
+    options: LearnOptions, tree: Document, rows: Lines, form: Format, *, is_data: bool
 ) -> None:
     """Write the model, and say what was done."""
     from fuzzytree.api import export
@@ -574,7 +586,7 @@ def _summary(
 
     return Summary(
         file=output,
-        fingerprint=fingerprint(learnt.tree),
+        fingerprint=fingerprint(learnt.model),
         rows=table.rows,
         columns=table.columns,
         classes=table.classes,
@@ -582,8 +594,8 @@ def _summary(
         rows_without_class=table.unlabelled,
         rows_without_weight=table.weightless,
         remarks=dict(noticed),
-        inputs=learnt.tree.inputs,
-        leaves=len(learnt.tree.leaves),
+        inputs=learnt.model.inputs,
+        leaves=len(learnt.model.leaves),
         accuracy=tested.mean if tested else None,
         majority=majority(table, settings),
         folds=tested.folds if tested and not tested.is_of_tree else None,

@@ -71,6 +71,7 @@ def filled(
     *,
     is_ordered: Sequence[bool],
     drops: bool,
+    is_apart: bool = False,
 ) -> FilledStatistics:
     """Return a table whose cells are all numbers, and what stands for missing ones.
 
@@ -81,6 +82,7 @@ def filled(
             keep; others get one (see `fuzzytree.learning.orders`).
         drops: Whether rows with a missing value are left out, as in the paper; nothing
             stands for a missing value then.
+        is_apart: Whether what stands for a missing value is no value of the column.
     """
     none = np.full(len(categories), math.nan)
     names = [*categories]
@@ -103,7 +105,9 @@ def filled(
         combinable[column] = adds
     stand_ins = np.array(
         [
-            _category(values) if texts else _number(values, raw.codes)
+            _category(values, is_apart=is_apart)
+            if texts
+            else _number(values, raw.codes, is_apart=is_apart)
             for values, texts in zip(rows.T, names, strict=True)
         ]
     )
@@ -116,20 +120,25 @@ def filled(
     return FilledStatistics(statistics, raw, stand_ins, (*names,), sizes, combinable)
 
 
-def _category(values: FloatArray) -> float:
+def _category(values: FloatArray, *, is_apart: bool) -> float:
     """Return -1 where a category is missing, else the most common one's position."""
-    if np.isnan(values).any() or not len(values):
+    if is_apart or np.isnan(values).any() or not len(values):
         return -1.0
     return float(np.bincount(values.astype(np.int64)).argmax())
 
 
-def _number(values: FloatArray, codes: IntArray) -> float:
+def _number(values: FloatArray, codes: IntArray, *, is_apart: bool) -> float:
     """Return what stands for a missing number; NaN if none is known."""
     is_known = np.isfinite(values)
     known = values[is_known]
     if not len(known):
         return math.nan
     ordered = np.sort(known)
+    low, high = float(ordered[0]), float(ordered[-1])
+    step = math.ldexp(1.0, math.frexp(high - low)[1] - 2) if high > low else 1.0
+    below = low - step
+    if is_apart:
+        return min(below, math.nextafter(low, -math.inf))
     median = float(ordered[(len(ordered) - 1) // 2])
     if is_known.all():
         return median
@@ -145,9 +154,6 @@ def _number(values: FloatArray, codes: IntArray) -> float:
     best = int(np.argmax(likely))
     own = _likelihood(gone, gone, classes)
     price = 0.5 * (len(np.unique(codes)) - 1) * math.log(len(codes))
-    low, high = float(ordered[0]), float(ordered[-1])
-    step = math.ldexp(1.0, math.frexp(high - low)[1] - 2) if high > low else 1.0
-    below = low - step
     if math.isfinite(below) and own - likely[best] > price:
         return below
     return float(places[best])

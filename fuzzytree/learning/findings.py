@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
-    """How a tree came about, and how its table departed from the paper's assumptions.
+    """How a model came about, and how its table departed from the paper's assumptions.
 
     Attributes:
         mode: `default` or `paper`.
@@ -38,6 +38,7 @@ class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
         single_rows: Patterns of one row.
         zero_spreads: Pairs of pattern and variable whose values are all equal; their
             sets are given a tenth of the spread within the other patterns.
+        rules: How many rules were learnt, one for each class, in place of a tree.
         leaves: Leaves of the tree; at most one per pattern.
         features_per_node: How many features each node needs, in node order.
         inseparable: Patterns that share a leaf though their classes differ.
@@ -64,18 +65,19 @@ class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
     classes_without_rows: tuple[str, ...]
     features_ignored: tuple[str, ...]
     patterns: dict[str, int]
-    single_rows: int
-    zero_spreads: int
-    leaves: int
-    features_per_node: tuple[int, ...]
+    rules: int = 0
+    single_rows: int = 0
+    zero_spreads: int = 0
+    leaves: int = 0
+    features_per_node: tuple[int, ...] = ()
     sets: int
-    off_peak: int
-    empty_centre: int
-    clipped: int
-    lowered: int
-    overshooting: int
-    rising: int
-    largest_flank_error: float
+    off_peak: int = 0
+    empty_centre: int = 0
+    clipped: int = 0
+    lowered: int = 0
+    overshooting: int = 0
+    rising: int = 0
+    largest_flank_error: float = 0.0
     patterns_refused: int = 0
     inseparable: int = 0
     levels_raised: int = 0
@@ -104,7 +106,8 @@ class LearningReport(Result, msgspec.Struct, frozen=True, kw_only=True):
         """Show the facts that are not zero, one a line."""
         lines = [f"{self.rows} rows, {sum(self.patterns.values())} patterns"]
         nodes = ", ".join(map(str, self.features_per_node)) or "none"
-        lines.append(f"{self.leaves} leaves; features per node: {nodes}")
+        tree = f"{self.leaves} leaves; features per node: {nodes}"
+        lines.append(f"{self.rules} rules, one for each class" if self.rules else tree)
         if self.sampled:
             lines.append(f"learnt from {self.sampling}")
         if self.features_ignored:

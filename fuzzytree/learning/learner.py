@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -13,9 +13,10 @@ from threadpoolctl import threadpool_limits
 
 from fuzzytree.cells import checked_weights, numbers_only, unmasked
 from fuzzytree.errors import LearningError
-from fuzzytree.learning.assembly import AssembledTree, TermNames, assembled
+from fuzzytree.learning.assembly import TermNames, assembled
 from fuzzytree.learning.binary import finished_tree
 from fuzzytree.learning.choosing import Front, chosen_tree, front_of
+from fuzzytree.learning.class_rules import class_rules
 from fuzzytree.learning.cuts import Sketch
 from fuzzytree.learning.filling import (
     FilledStatistics,
@@ -39,7 +40,7 @@ from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.tuning import SHARPNESS
 from fuzzytree.learning.units import FloatArray, IntArray, tallied
-from fuzzytree.model import FuzzyTree, text_fault
+from fuzzytree.model import FuzzyTree, RuleBase, text_fault
 
 Progress = Callable[[str, float], None]
 
@@ -50,18 +51,31 @@ _INCOMPLETE = (
 
 
 class Learnt(msgspec.Struct, frozen=True):
-    """What learning gives: the tree, and what was counted on the way.
+    """What learning gives: a tree or rules, and what was counted on the way.
 
     Attributes:
-        tree: The tree.
+        model: The tree, or the rules.
         report: What was counted.
-        limits: The largest hash of a row of each class that the tree may have been
-            grown from (`rows_beyond`); empty where others than these count.
+        limits: The largest hash of a row of each class that the model may have been
+            learnt from (`rows_beyond`); empty where others than these count.
     """
 
-    tree: FuzzyTree
+    model: FuzzyTree | RuleBase
     report: LearningReport
     limits: tuple[int, ...] = ()
+
+    @property
+    def tree(self) -> FuzzyTree:
+        """The tree.
+
+        Raises:
+            TypeError: If rules were learnt.
+        """
+        if not self.model.leaves:
+            classes = len(self.model.classes)
+            text = f"rules of {classes} classes were learnt, and no tree"
+            raise TypeError(f"{text}; form='tree' learns one")
+        return cast("FuzzyTree", self.model)  # nothing else has leaves
 
 
 def learn_arrays(
@@ -235,22 +249,48 @@ class ArrayLearner:
         return self.statistics.features > len(self.columns)
 
     def finish(self, *, progress: Progress | None = None) -> Learnt:
-        """Return the tree of all rows taken so far; more may follow.
+        """Return the tree or the rules of all rows taken so far; more may follow.
 
         Raises:
             LearningError: If there is no row, one class, or no column that varies.
         """
         ready = self._prepared()
-        sample, moments = ready.sample, ready.moments
-        progress = progress or (lambda _text, _share: None)
-        grow = self._paper if self.settings.mode == "paper" else self._default
-        grown = grow(ready, progress)
         whole = [
             name
             for place, name in enumerate(self.columns)
             if not self.categories.get(name) and self.statistics.is_whole(place)
         ]
         names = TermNames(self.name, self.columns, self.classes, self.units, whole)
+        learn = self._rules_of_classes if self._learns_rules else self._tree
+        model, facts = learn(ready, names, progress or (lambda _text, _share: None))
+        is_alone = self.settings.mode == "default" and not self._is_weighted
+        limits = self.statistics.limits() if is_alone else ()
+        return Learnt(model, self._report(ready, facts), limits)
+
+    @property
+    def _learns_rules(self) -> bool:
+        return self.settings.learns_rules(len(np.flatnonzero(self.statistics.counts())))
+
+    def _rules_of_classes(
+        self, ready: _Ready, names: TermNames, progress: Progress
+    ) -> tuple[FuzzyTree | RuleBase, dict[str, Any]]:
+        """Return a rule for each class, and what to report."""
+        progress("fitting sets", 0.0)
+        supports = tallied(ready.sample.codes, ready.supports, len(self.classes))
+        table, weights = ready.table, ready.weights
+        model = class_rules(names, table, self.statistics, weights, supports)
+        progress("fitting sets", 1.0)
+        labels = model.rule_labels
+        sets = len(labels) * len(model.variables)
+        patterns = dict.fromkeys(labels, 1)
+        return model, {"patterns": patterns, "rules": len(labels), "sets": sets}
+
+    def _tree(
+        self, ready: _Ready, names: TermNames, progress: Progress
+    ) -> tuple[FuzzyTree | RuleBase, dict[str, Any]]:
+        """Return a tree, and what to report."""
+        grow = self._paper if self.settings.mode == "paper" else self._default
+        grown = grow(ready, progress)
         progress("fitting sets", 0.0)
         made = assembled(
             grown.sketch,
@@ -266,7 +306,7 @@ class ArrayLearner:
         places = {name: place for place, name in enumerate(self.columns)}
         tree = with_probabilities(
             made.tree,
-            sample,
+            ready.sample,
             ready.weights,
             places,
             further_rows=grown.further_rows,
@@ -274,9 +314,23 @@ class ArrayLearner:
         )
         if self.settings.mode != "paper":
             tree = described(tree, self.columns, ready.table, self.statistics)
-        is_alone = self.settings.mode == "default" and not self._is_weighted
-        limits = self.statistics.limits() if is_alone else ()
-        return Learnt(tree, self._report(moments, sample, grown, made), limits)
+        patterns = grown.patterns
+        per_class = np.bincount(patterns.labels, minlength=len(self.classes))
+        return tree, {
+            "patterns": {
+                c: int(n) for c, n in zip(self.classes, per_class, strict=True) if n
+            },
+            "single_rows": int(np.count_nonzero(patterns.moments.counts == 1)),
+            "zero_spreads": made.zero_spreads,
+            "leaves": len(made.tree.leaves),
+            "features_per_node": tuple(
+                len(split.axis.features) for split in grown.sketch.splits
+            ),
+            "sets": made.sets,
+            **vars(made.repairs),
+            "largest_flank_error": made.largest_flank_error,
+            **grown.facts,
+        }
 
     def front(self) -> Front | None:
         """Return how accurate small trees are, by columns a node and by leaves.
@@ -306,7 +360,13 @@ class ArrayLearner:
         if self._is_weighted:
             categories.append(())
             is_ordered.append(False)
-        table = filled(self.statistics, categories, is_ordered=is_ordered, drops=drops)
+        table = filled(
+            self.statistics,
+            categories,
+            is_ordered=is_ordered,
+            drops=drops,
+            is_apart=self._learns_rules,
+        )
         dropped = self.statistics.dropped
         if dropped and not (drops or np.isfinite(table.stand_ins[:width]).any()):
             raise LearningError(_INCOMPLETE.format(dropped))
@@ -408,12 +468,9 @@ class ArrayLearner:
         cells = leaves * shape[1] + codes
         return tallied(cells, weights, shape[0] * shape[1]).reshape(shape)
 
-    def _report(
-        self, moments: Moments, sample: Sample, grown: _Grown, made: AssembledTree
-    ) -> LearningReport:
-        patterns = grown.patterns
+    def _report(self, ready: _Ready, facts: Mapping[str, Any]) -> LearningReport:
+        moments, sample = ready.moments, ready.sample
         usable = set(usable_features(moments).tolist())
-        per_class = np.bincount(patterns.labels, minlength=len(self.classes))
         drops, dropped = self.settings.drops_missing, self.statistics.dropped
         rows = self.statistics.counts().sum() - (dropped if drops else 0)
         rows += self.statistics.unlabelled if drops else 0
@@ -433,24 +490,7 @@ class ArrayLearner:
             features_ignored=tuple(
                 c for k, c in enumerate(self.columns) if k not in usable
             ),
-            patterns={
-                c: int(n) for c, n in zip(self.classes, per_class, strict=True) if n
-            },
-            single_rows=int(np.count_nonzero(patterns.moments.counts == 1)),
-            zero_spreads=made.zero_spreads,
-            leaves=len(made.tree.leaves),
-            features_per_node=tuple(
-                len(split.axis.features) for split in grown.sketch.splits
-            ),
-            sets=made.sets,
-            off_peak=made.repairs.off_peak,
-            empty_centre=made.repairs.empty_centre,
-            clipped=made.repairs.clipped,
-            lowered=made.repairs.lowered,
-            overshooting=made.repairs.overshooting,
-            rising=made.repairs.rising,
-            largest_flank_error=made.largest_flank_error,
-            **grown.facts,
+            **facts,
         )
 
 

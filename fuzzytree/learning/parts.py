@@ -18,7 +18,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Final, Unpack
+from typing import TYPE_CHECKING, Final, Unpack, cast
 
 import msgspec
 import numpy as np
@@ -284,15 +284,15 @@ class Learner:
         return result
 
     def learn(self, *, progress: Progress | None = None) -> FuzzyTree:
-        """Return the tree of all rows; more may follow.
+        """Return the tree of all rows, or rules as `fuzzytree.learn`; more may follow.
 
         Raises:
             LearningError: If there is no row, one class, or no column that varies.
         """
-        return self.learnt(progress=progress).tree
+        return cast("FuzzyTree", self.learnt(progress=progress).model)
 
     def learnt(self, *, progress: Progress | None = None) -> Learnt:
-        """Return the tree, and what was counted on the way.
+        """Return the tree or the rules, and what was counted on the way.
 
         Raises:
             LearningError: As `learn`.
@@ -319,8 +319,8 @@ class Learner:
         )
         learner.statistics = statistics.of_columns(found.kept)
         learnt = learner.finish(progress=progress)
-        tree = with_label_type(learnt.tree, self._labels.label_type())
-        return msgspec.structs.replace(learnt, tree=tree)
+        model = with_label_type(learnt.model, self._labels.label_type())
+        return msgspec.structs.replace(learnt, model=model)
 
     def table(self) -> Table:
         """Return the sampled rows as a table, each with the rows that it stands for.

@@ -71,7 +71,7 @@ def with_probabilities(
         sharpness = min((_fitted(rows, k, further_rows)[1], k) for k in _TRIED)[1]
     many = _thinned(sample, _MOST_TO_FIT // leaves)
     rows = _rated(tree, sample, many, weights, columns)
-    vectors = _in_parts(_fitted(rows, sharpness, further_rows)[0])
+    vectors = in_parts(_fitted(rows, sharpness, further_rows)[0])
     semantics = msgspec.structs.replace(tree.semantics, sharpness=sharpness)
     ends = tuple(
         msgspec.structs.replace(leaf, probabilities=tuple(vector))
@@ -221,11 +221,11 @@ def _vectors(
     return counts / totals, totals
 
 
-def _in_parts(vectors: FloatArray) -> FloatArray:
+def in_parts(vectors: FloatArray) -> FloatArray:
     """Return probabilities in whole millionths: rounded down, the rest to the largest.
 
     Example:
-        >>> _in_parts(np.array([[2 / 3, 1 / 3]])).tolist()
+        >>> in_parts(np.array([[2 / 3, 1 / 3]])).tolist()
         [[0.666667, 0.333333]]
     """
     parts = np.floor(vectors * PARTS)

@@ -11,6 +11,7 @@ import msgspec
 
 from fuzzytree.model import name_choice
 
+Form = Literal["tree", "rules"]
 ClassWeight = Mapping[str, float] | Literal["balanced"] | None
 
 
@@ -24,6 +25,9 @@ class LearningSettings(
             feature that makes the most groups of them in each node, and a combination
             of features where no single one splits it. `default` scores each split by
             the classes of the rows, and held-out rows prune the tree.
+        form: `tree`; or `rules`, one for each class, with a fuzzy set on each column
+            that distinguishes classes. None: rules of more than 200 classes, unless
+            one of the next four settings limits a tree. Of default mode.
         columns_per_node: How many columns a node looks at, at most; 1 gives rules in
             the table's own words, and paper mode without its step 7. None: as many as
             help.
@@ -65,6 +69,7 @@ class LearningSettings(
     """
 
     mode: Literal["default", "paper"] = "default"
+    form: Form | None = None
     columns_per_node: int | None = None
     leaves: int | None = None
     min_rows: int | None = None
@@ -116,13 +121,13 @@ class LearningSettings(
                 f"missing is 'learn', 'drop' or 'refuse', not {self.missing!r}",
             ),
         ]
-        for name in (
-            "columns_per_node",
-            "leaves",
-            "min_rows",
-            "depth",
-            "rows_per_class",
-        ):
+        form = self.form
+        text = f"form is 'tree', 'rules' or None, not {form!r}"
+        claims.append((form in (None, "tree", "rules"), text))
+        for name in _LIMITS if form == "rules" else ():
+            text = f"{name} is a setting of a tree, not of the form 'rules'"
+            claims.append((getattr(self, name) is None, text))
+        for name in (*_LIMITS, "rows_per_class"):
             value = getattr(self, name)
             text = f"{name} is at least 1, not {value!r}"
             claims.append((value is None or value >= 1, text))
@@ -149,6 +154,13 @@ class LearningSettings(
             claims.append((0 <= cost < math.inf, text))
         return claims
 
+    def learns_rules(self, classes: int) -> bool:
+        """Return whether rules are learnt of so many classes with rows, and no tree."""
+        if self.form is not None or self.mode == "paper":
+            return self.form == "rules"
+        limits = (getattr(self, name) for name in _LIMITS)
+        return classes > _MANY_CLASSES and all(limit is None for limit in limits)
+
     @property
     def drops_missing(self) -> bool:
         """Whether rows with a missing value are left out."""
@@ -159,6 +171,7 @@ class SettingArguments(TypedDict, total=False):
     """The fields of `LearningSettings`, as keywords of a function."""
 
     mode: Literal["default", "paper"]
+    form: Form | None
     columns_per_node: int | None
     leaves: int | None
     min_rows: int | None
@@ -229,8 +242,14 @@ def refuse_unknown(taker: str, names: Iterable[str], fields: Collection[str]) ->
             raise TypeError(f"{taker} has no setting {name!r}; {choice}")
 
 
+_MANY_CLASSES = 200
+"""With more classes than that, rules are learnt unless a tree is wanted."""
+
+_LIMITS = ("columns_per_node", "leaves", "min_rows", "depth")
+"""Settings that limit a tree."""
+
 _OF_MODE = {
-    "default": ("leaves", "min_rows", "depth", "class_weight"),
+    "default": ("form", "leaves", "min_rows", "depth", "class_weight"),
     "paper": ("alpha", "l_max", "patterns_per_class", "keep_reversals"),
 }
 """Settings that one mode alone has."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeVar
 
 import msgspec
 
@@ -27,6 +27,7 @@ from fuzzytree.model.rulebase import (
     Path,
     Proposition,
     Rule,
+    RuleBase,
     Semantics,
     Variable,
     naming_mistakes,
@@ -41,6 +42,8 @@ from fuzzytree.model.values import AnyModel, ModelKind, summary
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import Document
+
+Learned = TypeVar("Learned", bound="FuzzyTree | RuleBase")
 
 Use = Literal["tree", "relative", "raw"]
 """What a tree serves: its own path, its relative rules, the paper's raw rules."""
@@ -122,11 +125,11 @@ class FuzzyTree(AnyModel, frozen=True):
 
 
 def with_label_type(
-    tree: FuzzyTree, label_type: LabelType | msgspec.UnsetType
-) -> FuzzyTree:
-    """Return a tree whose class names stand for labels of a type."""
-    semantics = msgspec.structs.replace(tree.semantics, label_type=label_type)
-    return msgspec.structs.replace(tree, semantics=semantics)
+    model: Learned, label_type: LabelType | msgspec.UnsetType
+) -> Learned:
+    """Return a tree or rules whose class names stand for labels of a type."""
+    semantics = msgspec.structs.replace(model.semantics, label_type=label_type)
+    return msgspec.structs.replace(model, semantics=semantics)
 
 
 def depth(tree: Document) -> int:
