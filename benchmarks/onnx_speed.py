@@ -5,12 +5,20 @@ that set the figures to beat (there without a guard for missing values). All num
 a line come from one process; the columns are interleaved and medians are shown.
 
     python benchmarks/onnx_speed.py
+    python benchmarks/onnx_speed.py --nets
+
+`--nets` compares the graphs of a tree, among them the layers of a network, in batches
+of 100,000 rows in onnxruntime and in OpenVINO, if that is installed: the least
+processor time of nine calls.
 """
 
 from __future__ import annotations
 
+import argparse
+import importlib.util
 import random
 from collections.abc import Callable
+from time import process_time_ns
 
 import numpy as np
 import numpy.typing as npt
@@ -159,8 +167,64 @@ def _number(sheet: OnnxGraph, value: float) -> str:
     return sheet.constant(np.array(value, np.float32), "number")
 
 
+BATCH = 100_000
+
+
+def nets() -> None:
+    """Print nanoseconds a row of each graph of a tree, in each runtime."""
+    has_openvino = importlib.util.find_spec("openvino") is not None
+    runtimes = ["onnxruntime", "openvino"] if has_openvino else ["onnxruntime"]
+    found = machine(runtimes)
+    versions = ", ".join(f"{name} {v}" for name, v in found.versions.items())
+    print(f"{versions}; {found.processor}; ns a row of {BATCH}, one thread")
+    dtypes: tuple[Dtype, ...] = ("float32", "float64")
+    for leaves in (7, 50):
+        tree = multiway_tree(leaves)
+        for dtype in dtypes:
+            kind = np.float32 if dtype == "float32" else np.float64
+            for form in ("tree", "plain", "net"):
+                content = write_onnx(
+                    tree,
+                    dtype=dtype,
+                    signature="all",
+                    outputs=("rule",),
+                    plain=form == "plain",
+                    net=form == "net",
+                ).content
+                calls = [_call(content, "rule", BATCH, kind)]
+                if has_openvino and dtype == "float32" and form != "tree":
+                    calls.append(_call_openvino(content, BATCH))
+                times = " ".join(f"{_least_ns(call) / BATCH:>8.0f}" for call in calls)
+                print(f"  {leaves:>3} leaves {dtype} {form:6}{times}")
+
+
+def _least_ns(call: Callable[[], object]) -> int:
+    times: list[int] = []
+    for _ in range(9):
+        start = process_time_ns()
+        call()
+        times.append(process_time_ns() - start)
+    return min(times)
+
+
+def _call_openvino(content: bytes, rows: int) -> Callable[[], object]:
+    import openvino
+
+    core = openvino.Core()
+    settings = {"INFERENCE_PRECISION_HINT": "f32", "INFERENCE_NUM_THREADS": 1}
+    model = core.compile_model(core.read_model(content), "CPU", settings)
+    drawn = np.random.default_rng(0).normal(size=(rows, len(COLUMNS)))
+    values = drawn.astype(np.float32)
+    return lambda: model([values])
+
+
 def main() -> None:
-    """Print one table for rules and trees of each size."""
+    """Print one table for rules and trees of each size, or that of the nets."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--nets", action="store_true", help="the graphs of trees")
+    if parser.parse_args().nets:
+        nets()
+        return
     found = machine(["onnxruntime"])
     load = ", ".join(f"{value:.2f}" for value in found.load_before)
     versions = ", ".join(f"{name} {v}" for name, v in found.versions.items())

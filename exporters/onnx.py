@@ -55,9 +55,9 @@ OPERATORS: Mapping[str, str] = {
     **dict.fromkeys(
         """
         Abs Add And ArgMax Cast Ceil Clip Concat ConstantOfShape CumSum Div Equal Exp
-        Expand Floor Gather GatherElements Greater Less LessOrEqual Log MatMul Max Min
-        Mod Mul Neg Not Or Pad Pow ReduceMax ReduceMin ReduceSum Reshape Round Shape Sin
-        Slice Split Sqrt Sub Sum Tanh Transpose Unsqueeze Where
+        Expand Floor Gather GatherElements Gemm Greater Less LessOrEqual Log MatMul Max
+        Min Mod Mul Neg Not Or Pad Pow ReduceMax ReduceMin ReduceSum Relu Reshape Round
+        Shape Sign Sin Slice Split Sqrt Sub Sum Tanh Transpose Unsqueeze Where
         """.split(),  # noqa: SIM905
         "",
     ),
@@ -68,6 +68,7 @@ OPERATORS: Mapping[str, str] = {
 OLDEST: Mapping[str, str] = {
     "rules": "1.15.0",
     "plain tree": "1.15.0",
+    "net": "1.15.0",
     "readable rules": "1.15.0",
     "system": "1.15.0",
     "tree": "1.21.0",
@@ -99,6 +100,7 @@ def write_onnx(
     outputs: Sequence[Output] | None = None,
     readable: bool = False,
     plain: bool = False,
+    net: bool = False,
     verify: bool = True,
 ) -> Written:
     """Write a tree as the graph of its path, rules and systems as that of their rules.
@@ -134,6 +136,8 @@ def write_onnx(
             A fuzzy system's always is.
         plain: Whether a tree does without the operators of ai.onnx.ml, as rules and
             systems always do.
+        net: Whether a tree is written as layers of a network, of `Gemm`, `Sign` and
+            `Relu`, for runtimes that have little else; of at most 64 leaves.
         verify: Whether to load the file in onnxruntime and to compare its predictions.
 
     Returns:
@@ -141,8 +145,8 @@ def write_onnx(
 
     Raises:
         LossError: If float32 cannot represent a number of the model, unless allowed; if
-            a system needs a function that onnxruntime lacks in double; or if the
-            installed onnxruntime does not load the file.
+            a system needs a function that onnxruntime lacks in double; if a tree is
+            too large for a net; or if the installed onnxruntime does not load the file.
         DisagreementError: If the file, run in onnxruntime, gives another prediction.
         MissingExtraError: If onnx is not installed, or onnxruntime to verify with.
         ValueError: If an option is not one of those above.
@@ -158,6 +162,9 @@ def write_onnx(
         usual = ("label", "rule")
     outputs = usual if outputs is None else outputs
     _check_options(model, dtype, opset, ir, signature, outputs)
+    if net and (readable or not isinstance(model, FuzzyTree)):
+        what = "`readable`" if readable else f"a model of kind {kind_of(model)!r}"
+        raise ValueError(f"net: only a tree is written as a net, not {what}")
     columns = _columns(model, signature, columns)
     require("onnx", "writing onnx needs")
     if verify:
@@ -168,7 +175,10 @@ def write_onnx(
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, f"onnx {dtype}", lost)
     proto = _model_proto(
-        model, dtype, opset, ir, columns, outputs, readable=readable, plain=plain
+        *(model, dtype, opset, ir, columns, outputs),
+        readable=readable,
+        plain=plain,
+        net=net,
     )
     content: bytes = proto.SerializeToString(deterministic=True)
     if verify:
@@ -266,6 +276,7 @@ def _model_proto(
     *,
     readable: bool,
     plain: bool,
+    net: bool,
 ) -> onnx.ModelProto:
     from onnx import TensorProto
 
@@ -277,6 +288,7 @@ def _model_proto(
         model_proto,
         np_to_onnx,
     )
+    from fuzzytree.exporters.onnx_net import net_graph
     from fuzzytree.exporters.onnx_rules import rules_graph
     from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
 
@@ -297,8 +309,12 @@ def _model_proto(
     match model:
         case FuzzyTree() if not readable:
             onnx_ends.fill_inputs(graph, model, columns)
-            is_plain = plain or needs_plain(model)
-            frame = tree_graph(graph, model, columns, is_plain=is_plain)
+            if net:
+                facts["form"] = "net"
+                frame = net_graph(graph, model, columns)
+            else:
+                is_plain = plain or needs_plain(model)
+                frame = tree_graph(graph, model, columns, is_plain=is_plain)
             onnx_ends.add_tree_outputs(graph, model, frame, outputs)
         case RuleBase() if not readable:
             onnx_ends.fill_inputs(graph, model, columns)

@@ -72,6 +72,7 @@ def differences(
             "dtype": facts["dtype"],
             "columns": json.loads(facts["columns"]),
             "readable": facts.get("form") == "readable",
+            "net": facts.get("form") == "net",
             "verify": False,
         }
     try:

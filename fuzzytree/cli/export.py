@@ -55,6 +55,7 @@ class ExportOptions(WritingOptions):
         "--readable", "onnx: write a node with a name for each step of the model."
     )
     plain: bool = flag("--plain", "onnx: write a tree without operators of ai.onnx.ml.")
+    net: bool = flag("--net", "onnx: write a tree as layers of Gemm, Sign and Relu.")
     report: bool = flag(
         "--report", "c: print the bytes that small machines need for the file."
     )
@@ -79,6 +80,7 @@ def command(options: ExportOptions) -> int:
         "outputs": options.outputs.split(",") if options.outputs else None,
         "readable": options.readable or None,
         "plain": options.plain or None,
+        "net": options.net or None,
     }
     values: dict[str, Option] = {
         name: value for name, value in given.items() if value is not None

@@ -59,8 +59,8 @@ def graph_size(proto: onnx.ModelProto, rows: int) -> int:
                 raise ValueError  # it would be refused anyway
             shapes |= dict.fromkeys(node.output, shape)
             total += math.prod(shape) * len(node.output)
-            if node.op_type == "MatMul":
-                total += math.prod(shape) * operands[0][-1]
+            if node.op_type in ("MatMul", "Gemm"):
+                total += math.prod(shape) * operands[1][0]
             if node.op_type == "Shape":
                 known[node.output[0]] = np.array(operands[0])
             elif math.prod(shape) <= _FEW and all(one is not None for one in whole):
@@ -103,8 +103,8 @@ def _shape(
             return (*first[:axis], *operands[1], *first[axis:][1:])
         case "GatherElements":
             return operands[1]
-        case "MatMul":
-            return first[0], operands[1][1]
+        case "MatMul" | "Gemm":
+            return first[how.get("transA", 0)], operands[1][1]
         case "Pad":
             pads = whole[1].reshape(2, -1).sum(axis=0)
             return tuple((pads + first).tolist())

@@ -179,6 +179,7 @@ def prepare(
     dtype: Dtype = "float64",
     readable: bool = False,
     plain: bool = False,
+    net: bool = False,
     threads: int = 1,
     strengths: bool = False,
     probabilities: bool = False,
@@ -186,9 +187,9 @@ def prepare(
     """Write a model as ONNX, in memory, and open it.
 
     A `readable` graph of rules has a node for each operation, for people; a `plain` one
-    of a tree has no tree operators. One call uses at most `threads` threads.
-    `strengths` are returned of the rules of a system, too, and `probabilities` of rules
-    that have them.
+    of a tree has no tree operators, and a `net` of a tree has layers. One call uses at
+    most `threads` threads. `strengths` are returned of the rules of a system, too, and
+    `probabilities` of rules that have them.
 
     Raises:
         LossError: If the number type or the kind of graph cannot hold the model.
@@ -196,8 +197,9 @@ def prepare(
     """
     if readable and not model.rules:
         raise LossError("onnxruntime readable runs rules, and this is a tree")
-    if plain and model.rules:
-        raise LossError("onnxruntime plain runs trees, and these are rules")
+    if (plain or net) and model.rules:
+        name = "net" if net else "plain"
+        raise LossError(f"onnxruntime {name} runs trees, and these are rules")
     _require_packages("running")
 
     outputs: list[Output] = ["rule", "status"]
@@ -213,6 +215,7 @@ def prepare(
         outputs=outputs,
         readable=readable,
         plain=plain,
+        net=net,
         verify=False,
     ).content
     facts = _facts(_decoded(content, model.name), model.name)
@@ -547,9 +550,12 @@ def _runtime(
     *cannot: str,
     readable: bool = False,
     plain: bool = False,
+    net: bool = False,
     in_audits: bool = False,
 ) -> Runtime:
-    make = functools.partial(prepare, dtype=dtype, readable=readable, plain=plain)
+    make = functools.partial(
+        prepare, dtype=dtype, readable=readable, plain=plain, net=net
+    )
 
     def load(model: Document, *, with_strengths: bool = True) -> Run:
         return make(model, strengths=with_strengths, probabilities=True).run
@@ -581,4 +587,5 @@ RUNTIMES = (
     _runtime("float32", ("tree", "rules"), "float32", *_SINGLE, in_audits=True),
     _runtime("readable", ("rules",), "float64", readable=True),
     _runtime("plain", ("tree",), "float64", plain=True),
+    _runtime("net", ("tree",), "float64", "trees of more than 64 leaves", net=True),
 )

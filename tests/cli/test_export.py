@@ -14,6 +14,7 @@ from fuzzytree.exporters import TABLE, yaml
 from fuzzytree.model.contracts import Model, Written
 from fuzzytree.model.rulebase import Band, RuleBase, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
 
 HELP = "\n  fuzzytree export --help lists the options\n"
@@ -93,6 +94,25 @@ def test_the_certificate_is_that_of_the_number_type_that_was_written(
     text = "the class cannot change unless the two strongest classes differ by"
     assert f"bound    float64  {text} 6.7e-16 or less\n" in double
     assert f"bound    float32  {text} 1.1e-06 or less\n" in single
+
+
+def test_a_tree_is_written_as_a_net_that_check_accepts(call: Call) -> None:
+    assert call("export", "grip.yaml", "-o", "net.onnx", "--net")[0] == 0
+    code, out, _ = call("check", "grip.yaml", "net.onnx", "--runtime", "native")
+    assert code == 0
+    assert "net.onnx holds: tree, float64" in out
+
+
+def test_what_is_no_net_is_refused_in_one_sentence(call: Call) -> None:
+    words = ("export", "grip.yaml", "-o", "net.onnx", "--as", "rules", "--net")
+    only = "net: only a tree is written as a net, not a model of kind 'rules'"
+    assert call(*words) == (2, "", only + HELP)
+    ft.save(random_tree(0, leaves=70), "large.yaml")
+    code, out, err = call("export", "large.yaml", "-o", "net.onnx", "--net")
+    assert (code, out) == (2, "")
+    assert "as a net: it has 70 leaves, and" in err
+    assert "--plain" in err
+    assert not Path("net.onnx").exists()
 
 
 @pytest.mark.parametrize("representation", ["tree", "rules"])

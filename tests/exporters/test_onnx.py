@@ -269,12 +269,13 @@ def test_a_model_without_inputs_answers_rows_of_any_width(width: int) -> None:
     [
         (grip_tree(), {}),
         (grip_tree(), {"plain": True}),
+        (grip_tree(), {"net": True}),
         (grip_tree(), {"readable": True}),
         (rules_from_tree(grip_tree()), {}),
         (rules_from_tree(grip_tree()), {"readable": True}),
         (random_system(3, formulas="none"), {"outputs": ("outputs", "status")}),
     ],
-    ids=["tree", "plain tree", "readable tree", "rules", "readable rules", "system"],
+    ids=["tree", "plain", "net", "readable tree", "rules", "readable rules", "system"],
 )
 def test_the_columns_of_the_callers_rows_can_be_any(
     model: Document, options: dict[str, Any]

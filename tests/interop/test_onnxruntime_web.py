@@ -61,6 +61,7 @@ def graphs() -> Iterator[tuple[str, Document, dict[str, Any]]]:
         yield f"raw {dtype}", raw, {"dtype": dtype, **all_of}
         yield f"points {dtype}", with_points(product, 3), {"dtype": dtype, **all_of}
     yield "plain tree", tree, {"plain": True, **few}
+    yield "net", tree, {"net": True, **few}
     yield "readable", relative, {"readable": True, **all_of}
     systems = [one for one in all_samples().values() if isinstance(one, FuzzySystem)]
     yield "system", systems[0], {}
@@ -116,5 +117,5 @@ def test_a_browser_gives_the_bits_of_onnxruntime_for_every_kind_of_graph(
             else:
                 assert base64.b64decode(data) == right[name].tobytes()
             count += 1
-    assert len(jobs) == 15
+    assert len(jobs) == 16
     assert count > 50

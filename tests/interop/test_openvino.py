@@ -63,12 +63,12 @@ def test_it_refuses_a_tree_as_it_is_written_without_options(openvino: Any) -> No
 
 
 @pytest.mark.parametrize("seed", [2, 3, 5])
-@pytest.mark.parametrize("form", ["tree", "relative rules"])
+@pytest.mark.parametrize("form", ["plain", "net", "relative rules"])
 def test_graphs_in_float32_decide_there_as_in_onnxruntime(
     openvino: Any, form: str, seed: int
 ) -> None:
     tree = random_tree(seed, leaves=9, combinations=0.0)
-    model = tree if form == "tree" else rules_from_tree(tree)
+    model = rules_from_tree(tree) if form == "relative rules" else tree
     table = [list(row.values()) for row in probes(model, limit=500)]
     with np.errstate(over="ignore"):  # beyond float32 is missing in float32
         values = np.array(table).astype(np.float32)
@@ -78,7 +78,8 @@ def test_graphs_in_float32_decide_there_as_in_onnxruntime(
         model,
         values,
         dtype="float32",
-        plain=form == "tree",
+        plain=form == "plain",
+        net=form == "net",
         outputs=names,
         allow_loss=True,
     )
