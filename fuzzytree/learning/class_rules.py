@@ -44,6 +44,7 @@ _COLUMNS_OF_ROOT = 48  # with more the root is a higher one, or strengths vanish
 _SURE_COLUMNS = 6  # that count in full as evidence; what more columns say overlaps
 _FURTHER_ROWS = 4.0  # with the spread or the shares of all classes, in each class
 _FURTHER_CLASSES = 0.1  # rows of all classes evenly, in the probabilities of a rule
+_MOST_POOLED = 10.0  # times the usual variance, in that within all classes
 _CHANCE = 3.0  # standard errors above the power of a column that says nothing
 _LEAST_SHARE = 0.01  # of the spread of all rows, in a set
 _ULPS = 8
@@ -172,8 +173,9 @@ def _of_numbers(
 ) -> _Sets:
     """Return the sets on a column of numbers, by the rows in which they are known.
 
-    The spread of a class is drawn towards that within all classes, the more the fewer
-    rows it has.
+    The spread of a class is drawn towards the usual one, the more the fewer rows it
+    has. The usual one is the median, which a few wide classes and strange values leave
+    as it is, unless the spread of all rows within their classes is far larger.
     """
     classes = int(codes.max()) + 1
     values, codes, weights = sample.moved[known, place], codes[known], weights[known]
@@ -186,9 +188,12 @@ def _of_numbers(
     freedom = float(sizes.sum()) - classes
     usual, power = between / 4, between
     if freedom >= 1:
-        usual = float(within.sum()) / freedom
+        pooled = float(within.sum()) / freedom
         error = math.sqrt(2 / max(classes - 1, 1) + 2 / freedom)
-        power = between / max(usual, 1e-300) - 1 - _CHANCE * error
+        power = between / max(pooled, 1e-300) - 1 - _CHANCE * error
+        free = np.maximum(sizes - 1, 1.0)
+        own = within / free / (1 - 2 / (9 * free)) ** 3  # the median of chi squared
+        usual = max(float(np.median(own[sizes > 1])), pooled / _MOST_POOLED)
     usual = max(usual, _LEAST_SHARE**2 * between)
     rows = np.maximum(sizes, 1.0)
     variances = (within + _FURTHER_ROWS * usual) / (rows - 1 + _FURTHER_ROWS)

@@ -77,6 +77,23 @@ def test_many_gaussian_classes_are_predicted_as_well_as_by_gaussian_bayes(
     assert right > max(0.85, other.score(values[~kept], codes[~kept]) - 0.01)
 
 
+def test_wide_classes_and_strange_values_spoil_no_other_class() -> None:
+    values, codes = gaussians(250, 10)
+    kept = np.arange(len(codes)) % 3 > 0
+    wide = np.exp(values)
+    model = learnt(wide[kept], codes[kept]).model
+    other = GaussianNB().fit(wide[kept], codes[kept])
+    score = other.score(wide[~kept], codes[~kept])
+    assert share_right(model, wide[~kept], codes[~kept]) > score - 0.01 > 0.88
+    spoilt = values[kept]
+    spoilt[codes[kept] < 25, 0] *= 1e3
+    model = learnt(spoilt, codes[kept]).model
+    others = ~kept & (codes >= 25)
+    plain = learnt(values[kept], codes[kept]).model
+    usual = share_right(plain, values[others], codes[others])
+    assert share_right(model, values[others], codes[others]) > usual - 0.03
+
+
 def test_a_set_is_a_root_of_a_normal_density_with_its_spread_drawn_to_the_usual() -> (
     None
 ):
@@ -84,7 +101,10 @@ def test_a_set_is_a_root_of_a_normal_density_with_its_spread_drawn_to_the_usual(
     codes = np.array([0] * 4 + [1] * 3)
     model = learnt(np.array([[*wide, *narrow]]).T, codes, form="rules").model
     within = [statistics.variance(one) * (len(one) - 1) for one in (wide, narrow)]
-    usual, spreads = sum(within) / 5, []
+    medians = [
+        own / n / (1 - 2 / 9 / n) ** 3 for own, n in zip(within, (3, 2), strict=True)
+    ]
+    usual, spreads = sum(medians) / 2, []
     for own, rows in zip(within, (wide, narrow), strict=True):
         variance = (own + 4 * usual) / (len(rows) - 1 + 4)
         spreads.append(math.sqrt(variance * (1 + 1 / len(rows))))
