@@ -343,7 +343,7 @@ def test_an_option_that_a_writer_does_not_have_is_refused() -> None:
         ft.export(TREE, "onnx", dtpe="float32")
     assert str(caught.value) == (
         "onnx has no option 'dtpe'; it has dtype, opset, ir, signature, columns, "
-        "outputs, readable, plain, verify (did you mean 'dtype'?)"
+        "outputs, readable, plain, net, verify (did you mean 'dtype'?)"
     )
 
 
