@@ -197,6 +197,8 @@ class LearnOptions(TableAndColumns, TreeOptions, PaperOptions, OutputOptions):
 def command(options: LearnOptions) -> None:
     """Learn a fuzzy tree from TABLE and write it to FILE.
 
+    Of more than 200 classes a rule is learnt for each, and no tree; --form chooses.
+
     Learning straight to C, SQL or ONNX also saves the model as YAML, unless that file
     exists.
 
@@ -364,7 +366,8 @@ def _drawn(small: Front | None, path: str, name: str) -> tuple[str, str, str]:
 
     if small is None:
         raise click.UsageError(
-            "--front needs a table of twenty rows or more, the default mode, and a test"
+            "--front needs a tree of the default mode, a table of twenty rows or more "
+            "and 100 classes at most, and a test"
         )
     picture = draw_front(small, title=f"{name}: accuracy of small trees")
     write_atomically(path, picture.svg.encode())

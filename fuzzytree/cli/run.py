@@ -52,6 +52,7 @@ RunPart: TypeAlias = (
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a cell begins
 _BINARY = (".parquet", ".pq", ".arrow", ".feather")  # files that are no text
+_MOST_NAMED = 20  # classes whose rows are counted in words
 _GROUP = 1 << 26  # bytes of rows that a binary file gets at a time
 
 
@@ -428,6 +429,9 @@ class _Tally:
         from fuzzytree.report import counted, number
 
         counts = [f"{name} {count}" for name, count in self.classes.items()]
+        if len(counts) > _MOST_NAMED:
+            rest = len(counts) - _MOST_NAMED
+            counts[_MOST_NAMED:] = [counted(rest, "more class", "more classes")]
         counts += [
             f"{name} {number(low)} to {number(high)}"
             for name, (low, high) in self.spans.items()

@@ -20,6 +20,9 @@ def importances(tree: FuzzyTree) -> dict[str, float]:
     Returns:
         By column, with the sum 1; all 0 if no node gains anything.
 
+    Raises:
+        TypeError: If the model has no leaves.
+
     Example:
         >>> from fuzzytree.learning import learn_arrays
         >>> values = np.array([[1.0, 5.0], [2.0, 6.0], [7.0, 5.0], [8.0, 6.0]])
@@ -28,6 +31,9 @@ def importances(tree: FuzzyTree) -> dict[str, float]:
         >>> importances(found.tree)
         {'a': 1.0, 'b': 0.0}
     """
+    if not tree.leaves:
+        kind = f"{tree.name} is a rule base"  # as of more than 200 classes
+        raise TypeError(f"importances takes a tree, and {kind}")
     variables = {variable.name: variable for variable in tree.variables}
     result = dict.fromkeys(tree.columns or tree.inputs, 0.0)
     shares = [

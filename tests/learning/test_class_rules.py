@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+import re
 import statistics
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ import fuzzytree as ft
 from fuzzytree.cli import main
 from fuzzytree.errors import LearningError
 from fuzzytree.estimator import FuzzyTreeClassifier
-from fuzzytree.learning import LearningSettings, Learnt, learn_arrays
+from fuzzytree.learning import LearningSettings, Learnt, importances, learn_arrays
 from fuzzytree.model import FuzzyTree, Points, RuleBase
 from fuzzytree.semantics import Status
 from fuzzytree.semantics.reference import evaluate
@@ -301,6 +302,8 @@ def test_the_classifier_has_rules_in_the_place_of_a_tree() -> None:
     for other in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model)):
         assert (other.predict(values) == predicted).all()
     assert not hasattr(model, "tree_")
+    with pytest.raises(TypeError, match="importances takes a tree, and tree is a rule"):
+        importances(model.model_)  # type: ignore[arg-type]  # it is refused
     with pytest.raises(AttributeError, match=r"^model_ holds rules of 220 classes"):
         model.get_depth()
     tree = FuzzyTreeClassifier(form="tree", leaves=4).fit(values, codes)
@@ -349,6 +352,7 @@ def test_learn_says_that_rules_were_learnt_why_and_how_to_get_a_tree(
     assert "cross-validated" in said
     assert "choice" not in said
     assert main(["run", "rules.yaml", "rows.csv", "-o", "answers.csv"]) == 0
+    assert re.search(r"c0 \d+, .*, 190 more classes\n", capsys.readouterr().err)
     answers = pd.read_csv("answers.csv")["class"].tolist()
     right = [answer == f"c{k}" for answer, k in zip(answers, codes, strict=True)]
     assert np.mean(right) > 0.7
