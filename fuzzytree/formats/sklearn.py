@@ -5,6 +5,11 @@ threshold of 64: it goes left where `float32(x) <= threshold`. That is `x <= cut
 one double, the largest that is still rounded to a float that is not above the threshold
 (`exact_cut`). So our tree needs no rounding, and answers alike.
 
+Each node has a direction for missing values. Our tree has a value for each column that
+stands for a missing one, and reads directions that one value takes (`_stand_ins`). A
+node that separates missing values from all others has the threshold infinity; ours has
+a cut at 2**127 instead, below which all other values are.
+
 The library itself is not imported: what is read are the arrays of a fitted tree.
 """
 
@@ -19,12 +24,17 @@ import numpy as np
 
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
+    MOST_MIXED,
+    MOST_PROBABILITIES,
+    PARTS,
     Band,
     Branch,
+    FloatArray,
     FuzzyTree,
     LabelType,
     Leaf,
     Node,
+    Probabilities,
     Semantics,
     Term,
     Variable,
@@ -34,6 +44,7 @@ from fuzzytree.model import (
 )
 
 _BEYOND = 2.0**128  # where the floats of 32 bits would go on
+_MISSING = 2.0**127  # the cut above which a value counts as missing
 
 
 def from_sklearn(
@@ -48,9 +59,21 @@ def from_sklearn(
 ) -> FuzzyTree:
     """Return a fitted `DecisionTreeClassifier` as a tree.
 
-    Its answers are those of `predict` at every finite double. Rules made from it
-    (`fuzzytree.rules_from_tree`) are crisp, with strengths of 0 and 1; `soft` gives
-    them flanks, which changes no decision.
+    Its answers are those of `predict` at every finite double; a node that tests
+    whether a value is missing takes those above 2**127 (1.7e38) for missing too. Rules
+    made from it (`fuzzytree.rules_from_tree`) are crisp, with strengths of 0 and 1;
+    `soft` gives them flanks, which changes no decision.
+
+    Its probabilities are those of `predict_proba`, weights of classes included, in
+    whole millionths: each is less than a millionth off. With `soft` they are the mean
+    of all leaves, weighted by strength, so they change smoothly beside a cut. A tree of
+    more than 16,384 leaves, or of more than 1,048,576 leaves times classes, has none.
+
+    A row with missing values is answered as `predict` does, along the directions of
+    the nodes, in each column where one value takes the same directions: that value
+    stands for a missing one. A column where no value does so answers "no class" if
+    its directions are the library's habit, the child with more rows at each node, and
+    is refused if they were learnt.
 
     Args:
         classifier: A fitted tree with one output.
@@ -64,15 +87,14 @@ def from_sklearn(
         spreads: The spread of each column, such as `X.std(axis=0)`, if `soft` is a
             number.
         name: The tree's name.
-        missing: The class of a row with a missing value; None answers "no class".
-            Scikit-learn sends it along some branch, which nothing says is right.
+        missing: The class of each row with a missing value, instead of directions.
 
     Raises:
         TypeError: If it is no decision tree for classes, such as a forest or a
             regressor.
         ValueError: If it is not fitted, or names or widths do not fit.
-        LossError: If it has several outputs, tests whether a value is missing, or has
-            learnt where missing values go.
+        LossError: If it has several outputs, or has learnt directions of missing
+            values that no single value takes.
 
     Example:
         >>> from sklearn.tree import DecisionTreeClassifier
@@ -84,18 +106,27 @@ def from_sklearn(
     """
     grown = _grown(classifier)
     named = _Names.of(grown, columns, classes)
-    arrays = _Arrays.of(grown.tree_, named)
-    widths = _widths(arrays.used(named), named, soft, spreads)
+    arrays = _Arrays.of(grown.tree_, len(named.classes))
+    used = arrays.used(named)
+    widths = _widths(used, named, soft, spreads)
+    instead = {} if missing is not None else _stand_ins(arrays, named)
     nodes, leaves = _nodes(arrays, named)
     terms = _with_terms(nodes, widths)
     inputs = [column for column in named.columns if column in terms]
     return FuzzyTree(
         name=name,
         classes=named.classes,
-        variables=tuple(Variable(one, terms[one]) for one in inputs),
+        variables=tuple(
+            Variable(column, terms[column], missing=instead.get(used[column]))
+            for column in inputs
+        ),
         nodes=tuple(_named(nodes)),
         leaves=leaves,
-        semantics=Semantics(missing=missing, label_type=named.label_type),
+        semantics=Semantics(
+            missing=missing,
+            sharpness=1 if arrays.shares else msgspec.UNSET,
+            label_type=named.label_type,
+        ),
         columns=named.columns,
     )
 
@@ -182,25 +213,36 @@ class _Arrays(NamedTuple):
     right: list[int]
     column: list[int]
     cut: list[float]
+    sends_left: list[bool]  # a missing value
     winner: list[int]
     support: list[int]
+    shares: list[tuple[float, ...]]  # none without probabilities
 
     @staticmethod
-    def of(tree: Any, named: _Names) -> _Arrays:
-        left, right = tree.children_left.tolist(), tree.children_right.tolist()
-        columns, thresholds = tree.feature.tolist(), tree.threshold.tolist()
-        cuts: list[float] = []
-        for start, column, threshold in zip(left, columns, thresholds, strict=True):
-            if start >= 0 and not math.isfinite(threshold):
-                raise LossError(
-                    "cannot read a tree that tests whether "
-                    f"{named.columns[column]!r} is missing"
-                )
-            cuts.append(exact_cut(threshold) if start >= 0 else 0.0)
-        _refuse_directions(tree, columns, named)
-        winners = np.argmax(tree.value[:, 0, :], axis=1).tolist()
-        counts = tree.n_node_samples.tolist()
-        return _Arrays(left, right, columns, cuts, winners, counts)
+    def of(tree: Any, classes: int) -> _Arrays:
+        left = tree.children_left.tolist()
+        values = tree.value[:, 0, :]
+        leaves = left.count(-1)
+        has_shares = leaves <= MOST_MIXED and leaves * classes <= MOST_PROBABILITIES
+        return _Arrays(
+            left,
+            tree.children_right.tolist(),
+            tree.feature.tolist(),
+            [
+                exact_cut(threshold) if math.isfinite(threshold) else _MISSING
+                for threshold in tree.threshold.tolist()
+            ],
+            tree.missing_go_to_left.astype(bool).tolist(),
+            np.argmax(values, axis=1).tolist(),
+            tree.n_node_samples.tolist(),
+            # Negative weights of rows, which scikit-learn admits, are no shares.
+            _shares(values) if has_shares and values.min() >= 0.0 else [],
+        )
+
+    def learnt(self, place: int) -> bool:
+        """Return whether a node sends missing values elsewhere than without any."""
+        left, right = self.left[place], self.right[place]
+        return self.sends_left[place] != (self.support[left] > self.support[right])
 
     def used(self, named: _Names) -> dict[str, int]:
         """Return the columns that nodes test, and their indices."""
@@ -210,22 +252,65 @@ class _Arrays(NamedTuple):
         return {named.columns[place]: place for place in places}
 
 
-def _refuse_directions(tree: Any, columns: list[int], named: _Names) -> None:
-    """Refuse a tree that learnt where missing values go.
+def _shares(values: FloatArray) -> list[tuple[float, ...]]:
+    """Return shares in whole millionths, rounded down or up so that their sum is 1."""
+    parts = values / values.sum(axis=1, keepdims=True) * PARTS
+    whole = np.floor(parts)
+    rank = np.argsort(np.argsort(whole - parts, axis=1, kind="stable"), axis=1)
+    whole += rank < PARTS - whole.sum(axis=1, keepdims=True)
+    return [tuple(row) for row in (whole / PARTS).tolist()]
 
-    A node that saw none sends them to the child with more rows. Another direction was
-    learnt; one that happens to be the same cannot be distinguished.
+
+def _stand_ins(arrays: _Arrays, named: _Names) -> dict[int, float]:
+    """Return a value for each column that goes where a missing value goes.
+
+    It must do so at each node that a row without a value of the column can reach: at
+    most the cuts of those that send it left, above the cuts of the others.
+
+    Raises:
+        LossError: If there is none, and the directions were learnt. A node that saw no
+            missing value sends them to the child with more rows. Another direction was
+            learnt; one that happens to be the same cannot be distinguished.
     """
-    for place, goes_left in enumerate(tree.missing_go_to_left.tolist()):
-        left, right = int(tree.children_left[place]), int(tree.children_right[place])
-        if left < 0:
+    nodes: dict[int, list[int]] = {}
+    todo: list[tuple[int, frozenset[int]]] = [(0, frozenset())]
+    while todo:
+        place, out_of_reach = todo.pop()
+        if arrays.left[place] < 0:
             continue
-        counts = tree.n_node_samples
-        if bool(goes_left) != bool(counts[left] > counts[right]):
+        column, aside = arrays.column[place], out_of_reach
+        if column not in out_of_reach:
+            nodes.setdefault(column, []).append(place)
+            aside = out_of_reach | {column}
+        ways = [arrays.left[place], arrays.right[place]]
+        if not arrays.sends_left[place]:
+            ways.reverse()
+        todo.extend(zip(ways, (out_of_reach, aside), strict=True))
+    values: dict[int, float] = {}
+    for column, places in nodes.items():
+        above = [arrays.cut[p] for p in places if not arrays.sends_left[p]]
+        below = [arrays.cut[p] for p in places if arrays.sends_left[p]]
+        low, high = max(above, default=-math.inf), min(below, default=math.inf)
+        value = _between(low, high)
+        if low < value <= high:
+            values[column] = value
+        elif any(arrays.learnt(place) for place in places):
             raise LossError(
                 "cannot read a tree that learnt where missing values of "
-                f"{named.columns[columns[place]]!r} go"
+                f"{named.columns[column]!r} go: no single value goes there at all "
+                "nodes; missing= gives rows with missing values a class instead"
             )
+    return values
+
+
+def _between(low: float, high: float) -> float:
+    """Return a number above `low`, up to `high`, and not close to either if it can."""
+    if math.isinf(low):
+        return high - (abs(high) / 2.0 or 1.0)
+    if math.isinf(high):
+        return low + (abs(low) / 2.0 or 1.0)
+    middle = low / 2.0 + high / 2.0
+    return middle if low < middle else high
 
 
 def _widths(
@@ -281,7 +366,11 @@ def _nodes(arrays: _Arrays, named: _Names) -> tuple[list[_Bare], tuple[Leaf, ...
         place, parent = todo.pop()
         if arrays.left[place] < 0:
             label = named.classes[arrays.winner[place]]
-            leaves.append(Leaf(label, support=arrays.support[place]))
+            shares: Probabilities = msgspec.UNSET
+            if arrays.shares:
+                shares = arrays.shares[place]
+            support = arrays.support[place]
+            leaves.append(Leaf(label, support=support, probabilities=shares))
             end: tuple[int | None, int | None] = (None, len(leaves))
         else:
             column = named.columns[arrays.column[place]]
@@ -296,17 +385,19 @@ def _nodes(arrays: _Arrays, named: _Names) -> tuple[list[_Bare], tuple[Leaf, ...
 
 def _cut_names(nodes: Sequence[_Bare]) -> dict[tuple[str, float], tuple[str, str]]:
     """Return the names of the two terms of each cut."""
+    names: dict[tuple[str, float], tuple[str, str]] = {}
     cuts: dict[str, list[float]] = {}
     for node in nodes:
-        if node.cut not in cuts.setdefault(node.variable, []):
+        if node.cut == _MISSING:
+            names[node.variable, node.cut] = ("present", "missing")
+        elif node.cut not in cuts.setdefault(node.variable, []):
             cuts[node.variable].append(node.cut)
-    return {
-        (variable, cut): (below, above)
-        for variable, some in cuts.items()
+    for variable, some in cuts.items():
         for cut, (below, above) in zip(
             some, interval_names([[cut] for cut in some]), strict=True
-        )
-    }
+        ):
+            names[variable, cut] = (below, above)
+    return names
 
 
 def _with_terms(
@@ -317,7 +408,7 @@ def _with_terms(
     for (variable, cut), (below, above) in _cut_names(nodes).items():
         left = right = None
         width = widths[variable]
-        if width is not None:
+        if width is not None and cut != _MISSING:
             left, right = cut - width, cut + width
             if not left < cut < right or math.isinf(right - left):
                 raise ValueError(

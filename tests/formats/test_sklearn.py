@@ -9,6 +9,7 @@ import subprocess
 import sys
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -55,11 +56,11 @@ def test_a_cut_between_two_floats_is_right_for_either_parity(value: float) -> No
         assert single(cut) <= threshold < single(math.nextafter(cut, math.inf))
 
 
-def grown(seed: int, *, scale: float = 1.0, **options: Any) -> Any:
+def grown(seed: int, *, scale: float = 1.0, classes: int = 3, **options: Any) -> Any:
     chance = np.random.default_rng(seed)
     values = chance.normal(size=(200, 4)) * scale
     values[:, 1] = np.round(values[:, 1] / scale) * scale
-    labels = chance.integers(0, 3, 200) + 10
+    labels = chance.integers(0, classes, 200) + 10
     options.setdefault("max_leaf_nodes", 30)
     tree = trees.DecisionTreeClassifier(random_state=seed, **options)
     return tree.fit(values, labels)
@@ -82,7 +83,7 @@ def rows_of(tree: Any, chance: np.random.Generator) -> np.ndarray[Any, Any]:
     arrays = tree.tree_
     marks: list[list[float]] = [[0.0, 1.0, -1.0] for _ in range(tree.n_features_in_)]
     for column, threshold in zip(arrays.feature, arrays.threshold, strict=True):
-        if column >= 0:
+        if column >= 0 and math.isfinite(threshold):
             marks[column] += near(float(threshold))
     return np.column_stack([chance.choice(one, 400) for one in marks])
 
@@ -177,31 +178,143 @@ def test_a_tree_without_a_question_has_one_leaf() -> None:
     assert descend(ours, {}).label == "1"
 
 
+@pytest.mark.one_in(4)
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
+@pytest.mark.parametrize("classes", [2, 3])
+def test_probabilities_are_those_of_predict_proba(
+    classes: int, options: dict[str, Any]
+) -> None:
+    tree = grown(4, classes=classes, **{"max_leaf_nodes": 8, **options})
+    rows = rows_of(tree, np.random.default_rng(4))
+    result = fuzzytree.run(from_sklearn(tree), rows, with_probabilities=True)
+    assert result.probabilities is not None
+    off = np.abs(result.probabilities.T - tree.predict_proba(rows)).max()
+    assert off < (0.5e-6 + 1e-9 if classes == 2 else 1e-6)
+
+
+def test_a_probability_with_six_digits_is_kept_and_the_rest_is_rounded() -> None:
+    labels = ["a"] * 29 + ["b"] * 71
+    tree = trees.DecisionTreeClassifier().fit([[0.0]] * 100, labels)
+    assert from_sklearn(tree).leaves[0].probabilities == (0.29, 0.71)
+    tree.fit([[0.0]] * 3, ["a", "b", "c"])
+    vector = (0.333334, 0.333333, 0.333333)
+    assert from_sklearn(tree).leaves[0].probabilities == vector
+
+
+def test_soft_flanks_mix_the_probabilities_of_the_leaves() -> None:
+    tree = trees.DecisionTreeClassifier().fit([[0.0], [1.0]], ["a", "b"])
+    ours = from_sklearn(tree, soft={"x1": 1.0})
+    rows = np.array([[-1.0], [0.0], [0.5], [0.75], [2.0]])
+    result = fuzzytree.run(ours, rows, with_probabilities=True)
+    assert [*result.classes] == [*tree.predict(rows)]
+    assert result.probabilities is not None
+    mixed = [1.0, 1 / 1.5, 0.5, 0.75 / 1.75, 0.0]
+    assert result.probabilities[0].tolist() == pytest.approx(mixed, abs=2e-5)
+
+
+def test_a_tree_beyond_the_limits_or_of_negative_weights_has_no_probabilities(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tree = trees.DecisionTreeClassifier(max_depth=1)
+    tree.fit([[0.0], [0.0], [2.0]], ["a", "b", "b"], sample_weight=[-1.0, 2.0, 2.0])
+    ours = from_sklearn(tree)
+    assert {leaf.probabilities for leaf in ours.leaves} == {msgspec.UNSET}
+    tree.fit([[0.0], [2.0]], ["a", "b"])
+    assert from_sklearn(tree).semantics.sharpness == 1
+    monkeypatch.setattr("fuzzytree.formats.sklearn.MOST_MIXED", 1)
+    assert from_sklearn(tree).semantics.sharpness is msgspec.UNSET
+
+
 def test_a_missing_value_has_the_prediction_of_the_caller() -> None:
     tree = trees.DecisionTreeClassifier().fit([[0.0], [1.0]], ["a", "b"])
-    for missing in (None, "b"):
-        answer = descend(from_sklearn(tree, missing=missing), {"x1": math.nan})
-        assert (answer.label, answer.status) == (missing, Status.MISSING)
+    answer = descend(from_sklearn(tree, missing="b"), {"x1": math.nan})
+    assert (answer.label, answer.status) == ("b", Status.MISSING)
 
 
-def test_a_tree_that_asks_for_missing_values_is_refused() -> None:
+def with_gaps(seed: int, columns: int, **options: Any) -> Any:
+    """A tree that was fitted with missing values in some of its columns."""
+    chance = np.random.default_rng(seed)
+    values = chance.normal(size=(120, 4))
+    gaps = chance.random(values.shape) < 0.25
+    gaps[:, columns:] = False
+    labels = np.nan_to_num(values[:, 0]) + values[:, 3] + gaps[:, 1] > 0.3
+    values[gaps] = math.nan
+    return trees.DecisionTreeClassifier(random_state=seed, **options).fit(
+        values, labels.astype(int) + gaps[:, 0]
+    )
+
+
+@pytest.mark.parametrize("columns", range(5))
+def test_a_row_with_missing_values_is_answered_as_predict_does(columns: int) -> None:
+    read = whole = 0
+    for seed, leaves in itertools.product(range(12), (3, 8)):
+        tree = with_gaps(seed, columns, max_leaf_nodes=leaves)
+        try:
+            ours = from_sklearn(tree)
+        except LossError:
+            continue
+        rows = rows_of(tree, np.random.default_rng(seed))[:48].repeat(16, axis=0)
+        gaps = np.array([*itertools.product([False, True], repeat=4)] * 48)
+        rows[gaps] = math.nan
+        habit = [
+            ours.columns.index(v.name) for v in ours.variables if v.missing is None
+        ]
+        answered = ~gaps[:, habit].any(axis=1)
+        result = fuzzytree.run(ours, rows)
+        expected = np.where(answered, result.rule, 0)
+        assert result.rule.tolist() == expected.tolist()
+        found = [label for label in result.classes if label is not None]
+        assert found == tree.predict(rows[answered]).tolist()
+        read, whole = read + 1, whole + (not habit)
+    assert read >= 12
+    assert whole >= 3
+
+
+def test_a_tree_that_tests_for_missing_values_has_them_above_all_others() -> None:
     tree = trees.DecisionTreeClassifier()
     tree.fit([[math.nan], [math.nan], [1.0], [1.0]], ["a", "a", "b", "b"])
-    with pytest.raises(LossError) as caught:
-        from_sklearn(tree)
-    assert str(caught.value) == (
-        "cannot read a tree that tests whether 'x1' is missing"
+    ours = from_sklearn(tree, columns=["force"], soft={"force": 1.0})
+    assert str(ours) == (
+        "force? (cut at 1.70141e+38)\n  present: b [1]\n  missing: a [2]"
     )
+    for value, label in ((math.nan, "a"), (-1e38, "b"), (1.7e38, "b"), (0.0, "b")):
+        assert descend(ours, {"force": value}).label == label == tree.predict([[value]])
+    (force,) = ours.variables
+    assert force.missing == np.float32(force.missing) == 1.5 * 2.0**127
 
 
-def test_a_tree_that_learnt_where_missing_values_go_is_refused() -> None:
-    tree = trees.DecisionTreeClassifier()
-    tree.fit([[0.0], [0.0], [0.0], [1.0], [math.nan]], ["a", "a", "a", "b", "b"])
+def both_ways(*gaps: tuple[float, float, str]) -> Any:
+    """A tree that sends a missing force right where mass is 0, and left where it is 1.
+
+    Gaps are further rows; two of them turn both directions round.
+    """
+    rows = [(0.0, 0.0, "a")] * 4 + [(0.0, 2.0, "b")] * 5 + [(0.0, 2.0, "a")]
+    rows += [(1.0, 0.0, "c")] * 6 + [(1.0, 2.0, "d")] * 4
+    table = np.array([row[:2] for row in (*rows, *gaps)])
+    tree = trees.DecisionTreeClassifier(random_state=0, max_depth=2)
+    return tree.fit(table, [row[2] for row in (*rows, *gaps)])
+
+
+def test_directions_of_habit_that_no_single_value_takes_give_no_class() -> None:
+    ours = from_sklearn(both_ways(), columns=["mass", "force"])
+    mass, force = ours.variables
+    assert mass.missing == pytest.approx(0.75)
+    assert force.missing is None
+    answer = descend(ours, {"mass": 1.0, "force": math.nan})
+    assert answer.status == Status.MISSING
+
+
+def test_learnt_directions_that_no_single_value_takes_are_refused() -> None:
+    tree = both_ways((0.0, math.nan, "a"), (1.0, math.nan, "d"))
     with pytest.raises(LossError) as caught:
-        from_sklearn(tree, columns=["force"])
+        from_sklearn(tree, columns=["mass", "force"])
     assert str(caught.value) == (
-        "cannot read a tree that learnt where missing values of 'force' go"
+        "cannot read a tree that learnt where missing values of 'force' go: no single "
+        "value goes there at all nodes; missing= gives rows with missing values a "
+        "class instead"
     )
+    answer = descend(from_sklearn(tree, missing="c"), {"x1": 0.0, "x2": math.nan})
+    assert (answer.label, answer.status) == ("c", Status.MISSING)
 
 
 def test_several_outputs_are_refused() -> None:
