@@ -307,7 +307,13 @@ GROUPS = {
         *("diff", "recheck", "explain"),
     ),
     "results": (
-        *("Agreement", "auditing.Audit", "auditing.Code", "auditing.Compliance"),
+        *(
+            "Agreement",
+            "model.TreeAgreement",
+            "auditing.Audit",
+            "auditing.Code",
+            "auditing.Compliance",
+        ),
         *("auditing.Difference", "auditing.Explanation"),
         *("benchmarking.Footprint", "benchmarking.Study"),
         *("checking.Conversion", "checking.Stability", "learning.Front"),

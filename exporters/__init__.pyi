@@ -44,6 +44,7 @@ from .onnx_tree import tree_graph as tree_graph
 from .plugins import Plugin as Plugin
 from .plugins import all_plugins as all_plugins
 from .program_text import stated_options as stated_options
+from .program_text import tree_tests as tree_tests
 from .python import write_python as write_python
 from .table import TABLE as TABLE
 from .table import all_formats as all_formats

@@ -26,6 +26,7 @@ FILES: Final[Mapping[str, str]] = MappingProxyType(
         "audit.schema.json": "fuzzytree.auditing.findings.records:Audit",
         "bench.schema.json": "fuzzytree.benchmarking.records:Study",
         "board.schema.json": "fuzzytree.tactile.board_file:BoardFile",
+        "check-trees.schema.json": "fuzzytree.model.agreement:TreeAgreement",
         "check.schema.json": "fuzzytree.model.agreement:Agreement",
         "diff.schema.json": "fuzzytree.auditing.diff.records:Difference",
         "learn.schema.json": "fuzzytree.api.holdout:Summary",

@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeVar, Unpack, cast, get_args
+from typing import TYPE_CHECKING, Literal, TypeVar, Unpack, cast, get_args, overload
 
 import msgspec
 import numpy as np
@@ -35,6 +35,7 @@ from fuzzytree.api.settings import (
     check_arguments,
     with_arguments,
 )
+from fuzzytree.api.trees import check_trees
 from fuzzytree.checking import convert as convert
 from fuzzytree.checking import export as export
 from fuzzytree.checking import load as load
@@ -56,6 +57,7 @@ from fuzzytree.model import (
     Option,
     Progress,
     RuleBase,
+    TreeAgreement,
     Written,
     as_names,
     fingerprint,
@@ -357,6 +359,19 @@ def _values(parts: Sequence[Batch]) -> FloatArray:
     return values
 
 
+@overload
+def check(
+    model: Document,
+    *others: Carried,
+    data: object = None,
+    names: Sequence[str] = (),
+    runtimes: Sequence[str] | None = None,
+    settings: CheckSettings | None = None,
+    allow_loss: bool = False,
+    progress: Progress | None = None,
+    **options: Unpack[CheckArguments],
+) -> Agreement: ...
+@overload
 def check(
     model: ModelSource,
     *others: Carried,
@@ -367,8 +382,23 @@ def check(
     allow_loss: bool = False,
     progress: Progress | None = None,
     **options: Unpack[CheckArguments],
-) -> Agreement:
+) -> Agreement | TreeAgreement: ...
+def check(
+    model: ModelSource,
+    *others: Carried,
+    data: object = None,
+    names: Sequence[str] = (),
+    runtimes: Sequence[str] | None = None,
+    settings: CheckSettings | None = None,
+    allow_loss: bool = False,
+    progress: Progress | None = None,
+    **options: Unpack[CheckArguments],
+) -> Agreement | TreeAgreement:
     """Compare a model with everything that is made of it, in every runtime.
+
+    Two tree ensembles of other libraries are compared with each other: estimators of
+    scikit-learn, or the paths of `.skops` and ONNX files and of models of XGBoost
+    (JSON) and LightGBM (text). The result is a `TreeAgreement` then.
 
     Args:
         model: A tree, a rule base or a fuzzy system, or the path of one.
@@ -397,6 +427,9 @@ def check(
     """
     check_arguments(check, options, CheckArguments)
     chosen = with_arguments(settings or CheckSettings(), options)
+    trees = check_trees(model, others, data, as_names(names), chosen.limit)
+    if trees is not None:
+        return trees
     first = checking.as_model(model, allow_loss=allow_loss)
     titles = [
         os.fspath(other) if isinstance(other, str | os.PathLike) else f"file {number}"

@@ -23,7 +23,7 @@ from fuzzytree.cli.console import (
     takes,
     wrong_options,
 )
-from fuzzytree.model import Kind
+from fuzzytree.model import Kind, TreeAgreement
 
 
 class CheckOptions(TableOptions, FullResultOptions):
@@ -68,6 +68,10 @@ def command(options: CheckOptions) -> int:
     The tree, its rules, each runtime and each file predict the same rows; so do a fuzzy
     system, each runtime and each file. Exit 1 if two of them disagree. A program (C,
     Python, JavaScript, SQL, PMML) runs only if its text equals a new export.
+
+    Two tree ensembles of other libraries (.skops, ONNX, XGBoost's JSON, LightGBM's
+    text) are compared with each other: proved where they can be, run at and beside
+    their cuts otherwise.
     """
     from fuzzytree import api, report
 
@@ -85,7 +89,11 @@ def command(options: CheckOptions) -> int:
             allow_loss=options.allow_loss,
             progress=show,
         )
-    lines = report.agreement_lines(found, is_verbose=options.verbose)
+    lines = (
+        report.tree_lines(found, is_verbose=options.verbose)
+        if isinstance(found, TreeAgreement)
+        else report.agreement_lines(found, is_verbose=options.verbose)
+    )
     is_silent = options.quiet and found.ok
     answer_result(found.to_json, lines, as_json=options.as_json, is_silent=is_silent)
     return 0 if found.ok else 1

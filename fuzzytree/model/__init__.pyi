@@ -10,6 +10,10 @@ from .agreement import Comparison as Comparison
 from .agreement import Count as Count
 from .agreement import Coverage as Coverage
 from .agreement import FileContent as FileContent
+from .agreement import Question as Question
+from .agreement import TreeAgreement as TreeAgreement
+from .agreement import TreeAnswer as TreeAnswer
+from .agreement import TreeVerdict as TreeVerdict
 from .agreement import Unchecked as Unchecked
 from .agreement import Verdict as Verdict
 from .agreement import version as version

@@ -286,3 +286,88 @@ def _fault(one: Comparison | Certified) -> str:
     if one.verdict == "rows only":
         return f"{one.representation} is not {one.against}; its rows agree"
     return f"{one.representation} disagrees with {one.against}"
+
+
+Question = Literal["routes", "scores", "labels", "missing values", "programs"]
+"""What is compared of two tree ensembles."""
+
+TreeVerdict = Literal["PROVED", "DIFFER", "agree", "open", "not asked"]
+
+
+class TreeAnswer(msgspec.Struct, frozen=True):
+    """One question about two tree ensembles, and its answer.
+
+    Attributes:
+        question: `routes`: do rows arrive at leaves that belong together? `scores`: are
+            the sums of leaves equal but for rounding? `labels`: are the classes equal?
+            `missing values`: the same for rows with missing values. `programs`: what
+            two programs answered for the rows that were run.
+        rows: The number type of the rows.
+        verdict: `PROVED` and `DIFFER` are certain for all rows, `DIFFER` by a row that
+            both programs ran; `agree` holds for the rows that were run; `open` is not
+            decided, and `not asked` is outside of what both accept.
+        sentence: The answer in words.
+        bound: The largest difference of two scores that rounding allows.
+        row: A row that differs.
+        answers: What the first and the second say of it.
+    """
+
+    question: Question
+    rows: Literal["float32", "float64"]
+    verdict: TreeVerdict
+    sentence: str
+    bound: float | None = None
+    row: tuple[float | None, ...] | None = None
+    answers: tuple[str, ...] = ()
+
+
+class TreeAgreement(Result, msgspec.Struct, frozen=True):
+    """Whether two tree ensembles are the same function; `row` has None for NaN.
+
+    Attributes:
+        first, second: What was compared.
+        kinds: What each is.
+        programs: What ran each.
+        leaves: How many each has.
+        answers: To all questions, for both number types of rows.
+        columns: The names of columns, where they are known.
+        remarks: What a program does that its file does not say.
+    """
+
+    FORMAT: ClassVar[str] = "fuzzytree-check-trees/1"
+
+    first: str
+    second: str
+    kinds: tuple[str, str]
+    programs: tuple[str, str]
+    leaves: tuple[int, int]
+    answers: tuple[TreeAnswer, ...]
+    columns: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether no answer is that they differ."""
+        return not self.wrong
+
+    @property
+    def wrong(self) -> tuple[TreeAnswer, ...]:
+        """What makes `ok` false."""
+        return tuple(each for each in self.answers if each.verdict == "DIFFER")
+
+    def __repr__(self) -> str:
+        """Show how many answers there are, and how they end."""
+        verdict = "same" if self.ok else "DIFFER"
+        return f"TreeAgreement({len(self.answers)} answers, {verdict})"
+
+    def to_json(self) -> str:
+        """Return the same facts for programs, as indented JSON."""
+        head = {"format": self.FORMAT, "version": version(), "ok": self.ok}
+        raw = msgspec.json.encode({**head, **msgspec.to_builtins(self)})
+        return msgspec.json.format(raw, indent=2).decode()
+
+    def raise_if_not_ok(self) -> None:
+        """Raise DisagreementError, naming what differs, unless nothing does."""
+        if self.wrong:
+            lines = [f"{each.question}: {each.sentence}" for each in self.wrong]
+            raise DisagreementError("\n".join(lines))

@@ -45,6 +45,7 @@ from .text import agreement_verdict as agreement_verdict
 from .text import aligned as aligned
 from .text import counted as counted
 from .text import number as number
+from .trees import tree_lines as tree_lines
 from .what_if import Page as Page
 from .what_if import what_if_page as what_if_page
 from .why import why_lines as why_lines

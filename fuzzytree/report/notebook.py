@@ -14,7 +14,14 @@ from typing import Any, Final
 from fuzzytree.auditing import Audit, Code, Compliance, Difference, Explanation
 from fuzzytree.benchmarking import Footprint, Study
 from fuzzytree.checking import Stability
-from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, Result, RuleBase
+from fuzzytree.model import (
+    Agreement,
+    FuzzySystem,
+    FuzzyTree,
+    Result,
+    RuleBase,
+    TreeAgreement,
+)
 from fuzzytree.numerics import Certificate
 from fuzzytree.report.audit import audit_lines, explanation_lines
 from fuzzytree.report.bench import study_lines
@@ -26,6 +33,7 @@ from fuzzytree.report.parts import part
 from fuzzytree.report.require import compliance_lines
 from fuzzytree.report.stability import stability_lines
 from fuzzytree.report.text import agreement_lines
+from fuzzytree.report.trees import tree_lines
 from fuzzytree.report.why import why_lines
 from fuzzytree.runtimes import Outputs, Predictions
 
@@ -45,6 +53,7 @@ _LINES: Final[dict[type[Any], Callable[[Any], Iterable[str]]]] = {
     RuleBase: model_lines,
     Stability: stability_lines,
     Study: study_lines,
+    TreeAgreement: tree_lines,
 }
 
 

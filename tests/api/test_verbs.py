@@ -354,6 +354,7 @@ def test_check_takes_files_and_names_them(tmp_path: Path) -> None:
     result = ft.check(
         yaml, onnx, data=ROWS, runtimes=["native"], settings=ft.CheckSettings(limit=300)
     )
+    assert isinstance(result, ft.Agreement)
     assert result.ok
     assert str(onnx) in {comparison.representation for comparison in result.comparisons}
 
