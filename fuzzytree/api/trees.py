@@ -11,12 +11,12 @@ import numpy as np
 
 from fuzzytree import checking, ensembles
 from fuzzytree.errors import LossError, TableError
-from fuzzytree.model import FloatArray, FuzzyTree, TreeAgreement
+from fuzzytree.model import FloatArray, TreeAgreement
 from fuzzytree.tables import batches, pieces
 
 if TYPE_CHECKING:
     from fuzzytree.api.answering import Carried
-    from fuzzytree.model import ModelSource
+    from fuzzytree.model import FuzzyTree, ModelSource
 
 
 def check_trees(
@@ -67,9 +67,9 @@ def _of_ours(source: ModelSource | Carried) -> ensembles.Opened:
         LossError: If it is no tree, or cuts what no tree of another library cuts.
     """
     model = checking.as_model(cast("ModelSource", source))
-    if not isinstance(model, FuzzyTree):
+    if model.outputs or model.rules:
         raise LossError(f"{model.name}: rules and systems are not compared with trees")
-    result = ensembles.opened_tree(model)
+    result = ensembles.opened_tree(cast("FuzzyTree", model))
     if isinstance(source, str | os.PathLike):
         return result.named(str(os.fspath(source)))
     return result

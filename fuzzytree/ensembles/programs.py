@@ -33,6 +33,7 @@ from fuzzytree.model import version as own_version
 _MOST_UNPACKED = 1 << 30  # bytes of a .skops file
 _MOST_MEMBERS = 100_000
 _TRUSTED = ("sklearn.ensemble.", "sklearn.tree.", "sklearn._loss.")
+_TREES = b"TreeEnsemble"
 _OWN_KEY = b"fuzzytree.format"  # in ONNX files that fuzzytree wrote
 
 
@@ -98,7 +99,8 @@ def opened(source: object) -> Opened | None:
         return _of_estimator(_unpacked(read_bounded(source), name), name)
     if suffix == ".onnx":
         content = read_bounded(source)
-        return None if _OWN_KEY in content else _of_onnx(content, name)
+        is_other = _TREES in content and _OWN_KEY not in content
+        return _of_onnx(content, name) if is_other else None
     if suffix in (".json", ".txt"):
         content = read_bounded(source)
         if suffix == ".txt" and not content.startswith(b"tree\n"):
