@@ -37,6 +37,10 @@ _RUN = (
 _MODES = ["LEQ", "LT", "GTE", "GT", "EQ", "NEQ", "MEMBER"]  # of TreeEnsemble, by number
 
 
+class NotOnnxError(ReadError):
+    """A file of other content, or a part of one."""
+
+
 class OnnxTrees(NamedTuple):
     """A graph that was read.
 
@@ -109,7 +113,7 @@ def _graph(content: bytes, name: str) -> onnx.GraphProto:
     try:
         proto = onnx.load_from_string(content)
     except Exception as error:  # DecodeError of protobuf, which has no types
-        raise ReadError(f"{name}: is not an ONNX file") from error
+        raise NotOnnxError(f"{name}: is not an ONNX file") from error
     if proto.functions or any(
         each.data_location == onnx.TensorProto.EXTERNAL
         for each in proto.graph.initializer

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import io
 import os
@@ -21,7 +22,7 @@ from fuzzytree.ensembles.boosters import (
     run_lightgbm,
     run_xgboost,
 )
-from fuzzytree.ensembles.onnx_trees import OnnxTrees, from_onnx
+from fuzzytree.ensembles.onnx_trees import NotOnnxError, OnnxTrees, from_onnx
 from fuzzytree.ensembles.sklearn_trees import from_estimator, is_sklearn
 from fuzzytree.ensembles.trees import Ensemble, Rows, Tree
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
@@ -99,8 +100,10 @@ def opened(source: object) -> Opened | None:
         return _of_estimator(_unpacked(read_bounded(source), name), name)
     if suffix == ".onnx":
         content = read_bounded(source)
-        is_other = _TREES in content and _OWN_KEY not in content
-        return _of_onnx(content, name) if is_other else None
+        if _OWN_KEY in content or _TREES not in content:
+            return None
+        with contextlib.suppress(NotOnnxError):  # which other readers report
+            return _of_onnx(content, name)
     if suffix in (".json", ".txt"):
         content = read_bounded(source)
         if suffix == ".txt" and not content.startswith(b"tree\n"):
