@@ -32,8 +32,8 @@ FIRST_LINES = {
     "run wine.yaml t.csv -o p.csv": "predicted 178 rows barbera 49, barolo 62,",
     "run wine.yaml t.csv --why -o p.csv": "predicted 178 rows barbera 49, barolo",
     "why wine.yaml --data t.csv --number 66": "wine: grignolino by rule 3, probab",
-    "check wine.yaml": "wine: none of 79 comparisons disagrees (238 ",
-    "check wine.yaml bad.yaml": "wine: 2 of 81 comparisons disagree (238 ",
+    "check wine.yaml": "wine: none of 81 comparisons disagrees (238 ",
+    "check wine.yaml bad.yaml": "wine: 2 of 83 comparisons disagree (238 ",
     "audit wine.yaml": "nothing found; 30 questions, ",
     "audit wine.yaml --data t.csv --target cultivar": "1 finding: 1 note; ",
     "require wine.yaml --that every__input__gets__a__class": (
