@@ -46,7 +46,7 @@ FIRST_LINES = {
     "bench wine.yaml --budget 6 --rows 1 --threads 1 --select native": "",
     "needs wine.yaml": "wine: needs 3 of 13 columns; 3 parts can be left out",
     "stability wine.yaml": "wine: 9 of 10 stability checks pass, none fails (",
-    "formats": "13 formats, 15 runtimes; no extra is missing",
+    "formats": "13 formats, 16 runtimes; no extra is missing",
     "formats --format fcl": "fcl: .fcl, read and written, computes in float64",
     "doctor": "self-test passed: learning, writing, reading and running agree",
     "tactile": "",
