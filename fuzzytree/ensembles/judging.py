@@ -265,7 +265,8 @@ class _Judge:
         if one.decides == "not":
             return self._answer("labels", "not asked", "both predict numbers")
         names = [
-            each and [str(name) for name in each] for each in (one.classes, two.classes)
+            each and [_class_name(label) for label in each]
+            for each in (one.classes, two.classes)
         ]
         if names[0] and names[1] and names[0] != names[1]:
             text = f"the classes are {names[0]} and {names[1]}"
@@ -363,13 +364,9 @@ class _Judge:
         if not pair.ran:
             absent = [side.program for side in pair.sides if side.run is None]
             return self._answer("programs", "open", f"not run by {', '.join(absent)}")
-        names = " and ".join(side.program for side in pair.sides)
-        counts = [
-            f"{_WHAT[each]} of {n:,} rows differ" for each, n in pair.counts.items()
-        ]
-        text = (
-            f"{pair.ran:,} rows in {names}: {', '.join(counts) or 'no answer differs'}"
-        )
+        counts = [f"{_OTHER[each]} in {n:,}" for each, n in pair.counts.items()]
+        shown = ", ".join(counts) or "no answer differs"
+        text = f"{pair.ran:,} rows were run: {shown}"
         if not counts:
             return self._answer("programs", "agree", text)
         witness = next(iter(pair.differing.values()))
@@ -420,6 +417,17 @@ _WHAT: dict[Question, str] = {
     "scores": "numbers",
     "missing values": "answers with missing values",
 }
+
+_OTHER: dict[Question, str] = {
+    "labels": "other classes",
+    "scores": "other numbers",
+    "missing values": "other answers with missing values",
+}
+
+
+def _class_name(label: object) -> str:
+    """Return a label as text; converters write booleans as 0 and 1."""
+    return str(int(label) if isinstance(label, bool) else label)
 
 
 def _decided(ensemble: Ensemble, scores: FloatArray) -> IntArray:

@@ -92,7 +92,13 @@ def from_onnx(content: bytes, name: str) -> OnnxTrees:
         ensemble = _version_5(attributes, takes, name)
     else:
         ensemble = _versions_1_to_3(attributes, node.op_type, takes, name)
-    unread = [each.op_type for each in after if each.op_type not in _SILENT]
+    ones = _ones(graph)
+    unread = [
+        each.op_type
+        for each in after
+        if each.op_type not in _SILENT
+        and not (each.op_type == "Mul" and ones.intersection(each.input))
+    ]
     label, output = _ends(graph)
     width = graph.input[0].type.tensor_type.shape.dim
     columns = width[1].dim_value if len(width) == 2 else 0
@@ -120,6 +126,17 @@ def _graph(content: bytes, name: str) -> onnx.GraphProto:
     ):
         raise ReadError(f"{name}: functions and data in other files are not read")
     return proto.graph
+
+
+def _ones(graph: onnx.GraphProto) -> set[str]:
+    """Return the constants that are 1, by which onnxmltools multiplies."""
+    from onnx import numpy_helper
+
+    return {
+        each.name
+        for each in graph.initializer
+        if list(each.dims) in ([], [1]) and numpy_helper.to_array(each) == 1
+    }
 
 
 def _is_before(node: onnx.NodeProto, graph: onnx.GraphProto) -> bool:

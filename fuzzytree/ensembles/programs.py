@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import inspect
 import io
 import os
 import warnings
@@ -81,14 +82,17 @@ def opened(source: object) -> Opened | None:
     """Return a tree ensemble; None if a source is none, or is ours.
 
     Args:
-        source: A fitted estimator of scikit-learn, or the path of an ONNX or `.skops`
-            file or of a model of XGBoost or LightGBM.
+        source: A fitted estimator of scikit-learn, XGBoost or LightGBM, or the path of
+            an ONNX or `.skops` file or of a model of XGBoost or LightGBM.
 
     Raises:
         ReadError: If a file cannot be read.
         LossError: If an estimator is of a kind that is not read.
         MissingExtraError: If what reads it is not installed.
     """
+    saved = _saved_booster(source)
+    if saved is not None:
+        return _of_booster(*saved, type(source).__name__)
     if is_sklearn(source):
         result = _of_estimator(source, type(source).__name__)
         is_ours = result.ensemble.kind == "DecisionTreeClassifier"
@@ -108,14 +112,30 @@ def opened(source: object) -> Opened | None:
         content = read_bounded(source)
         if suffix == ".txt" and not content.startswith(b"tree\n"):
             return None
-        read = (
-            (from_xgboost, run_xgboost)
-            if suffix == ".json"
-            else (from_lightgbm, run_lightgbm)
-        )
-        ensemble = read[0](content, name)
-        return Opened(ensemble, *read[1](content, ensemble))
+        return _of_booster(content, suffix, name)
     return None
+
+
+def _saved_booster(model: Any) -> tuple[bytes, str] | None:
+    """Return what XGBoost or LightGBM saves of a fitted object, and the suffix."""
+    packages = {
+        parent.__module__.partition(".")[0] for parent in inspect.getmro(type(model))
+    }
+    if "xgboost" in packages:
+        booster = model.get_booster() if hasattr(model, "get_booster") else model
+        return bytes(booster.save_raw("json")), ".json"
+    if "lightgbm" in packages:
+        booster = model.booster_ if hasattr(type(model), "booster_") else model
+        return booster.model_to_string().encode(), ".txt"
+    return None
+
+
+def _of_booster(content: bytes, suffix: str, name: str) -> Opened:
+    if suffix == ".json":
+        ensemble = from_xgboost(content, name)
+        return Opened(ensemble, *run_xgboost(content, ensemble))
+    ensemble = from_lightgbm(content, name)
+    return Opened(ensemble, *run_lightgbm(content, ensemble))
 
 
 def _of_estimator(model: Any, name: str) -> Opened:

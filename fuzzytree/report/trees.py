@@ -82,6 +82,8 @@ def _row_text(
         )
         if value != 0.0
     ]
+    if not cells:
+        return "all columns are 0"
     shown = cells if is_verbose else cells[:_MOST_VALUES]
     more = len(cells) - len(shown)
     rest = f"{more} more are not 0" if more else "all others are 0"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import json
 import re
@@ -285,3 +286,47 @@ def test_what_cannot_be_compared_is_refused(
     other.fit(rows, target)
     with pytest.raises(LossError, match=words):
         check(other, written(model, 4, tmp_path / "m.onnx"))
+
+
+def test_booleans_are_the_classes_0_and_1_of_a_graph(tmp_path: Path) -> None:
+    model = DecisionTreeClassifier().fit([[0], [1]], [False, True])
+    found = check(model, written(model, 1, tmp_path / "m.onnx"))
+    assert verdicts(found, "labels") == {"PROVED"}
+
+
+def test_a_row_of_zeros_is_shown_as_such(tmp_path: Path) -> None:
+    model = DecisionTreeRegressor().fit([[-1], [1]], [0.0, 1.0])
+    other = DecisionTreeRegressor().fit([[-1], [1]], [2.0, 1.0])
+    found = check(model, written(other, 1, tmp_path / "m.onnx"))
+    assert "  where all columns are 0\n" in str(found)
+
+
+def test_objects_of_boosters_are_compared_as_their_files(tmp_path: Path) -> None:
+    lightgbm, xgboost = map(pytest.importorskip, ("lightgbm", "xgboost"))
+    rows, target = IRIS
+    for model, name, save in (
+        (xgboost.XGBClassifier(n_estimators=2), "m.json", "save_model"),
+        (lightgbm.LGBMClassifier(n_estimators=2, verbose=-1), "m.txt", None),
+    ):
+        model.fit(rows, target)
+        path = tmp_path / name
+        (model if save else model.booster_).save_model(path)
+        for source in (model, model.get_booster() if save else model.booster_):
+            found = check(source, path)
+            assert found.ok
+            assert found.first == type(source).__name__
+            assert verdicts(found, "scores") == {"PROVED"}
+
+
+def test_graphs_of_onnxmltools_are_read_to_their_end(tmp_path: Path) -> None:
+    lightgbm, onnxmltools = map(pytest.importorskip, ("lightgbm", "onnxmltools"))
+    types = importlib.import_module("onnxmltools.convert.common.data_types")
+    rows, target = np.round(IRIS[0] * 10), IRIS[1] > 0
+    model = lightgbm.LGBMClassifier(n_estimators=2, verbose=-1)
+    model.fit(rows, target.astype(int))
+    graph = onnxmltools.convert_lightgbm(
+        model, initial_types=[("X", types.FloatTensorType([None, 4]))], zipmap=False
+    )
+    assert "Mul" in [node.op_type for node in graph.graph.node]
+    (tmp_path / "m.onnx").write_bytes(graph.SerializeToString())
+    assert "not read" not in str(check(model, tmp_path / "m.onnx"))
