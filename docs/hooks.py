@@ -278,6 +278,9 @@ WORDS = {
     "how-to/install.md": ("install", "uninstall", "pip"),
     "how-to/use-results-in-python.md": ("notebook", "jupyter"),
     "how-to/what-if-page.md": ("what-if", "sliders"),
+    "how-to/why-your-converted-tree-differs.md": (
+        *("skl2onnx", "onnxmltools", "m2cgen", "treelite", "lightgbm", "xgboost"),
+    ),
     "reference/c.md": ("microcontroller", "arduino", "embedded"),
     "reference/findings.md": ("dead rule", "conflict", "gap"),
     "reference/formats.md": ("export", "convert"),
