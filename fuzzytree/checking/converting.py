@@ -240,8 +240,8 @@ def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
 
     Args:
         source: A tree, a rule base or a fuzzy system; a fitted `FuzzyTreeClassifier`
-            or `DecisionTreeClassifier`; a system of scikit-fuzzy or simpful; or the
-            path of a file.
+            or `DecisionTreeClassifier`, or a `Pipeline` of scalers and the latter; a
+            system of scikit-fuzzy or simpful; or the path of a file.
         allow_loss: As in `load`.
 
     Raises:
@@ -263,14 +263,15 @@ def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
             return reader(source)
     raise TypeError(
         "a model is a FuzzyTree, a RuleBase, a FuzzySystem, a fitted "
-        "FuzzyTreeClassifier or DecisionTreeClassifier, a ControlSystem of "
-        "scikit-fuzzy, a FuzzySystem of simpful, or the path of a file, and not "
-        f"a value of type {type(source).__name__}"
+        "FuzzyTreeClassifier or DecisionTreeClassifier, a Pipeline that ends with the "
+        "latter, a ControlSystem of scikit-fuzzy, a FuzzySystem of simpful, or the "
+        f"path of a file, and not a value of type {type(source).__name__}"
     )
 
 
 _OBJECT_READERS: dict[tuple[str, str], Callable[[object], Document]] = {
     ("sklearn.tree._classes", "DecisionTreeClassifier"): from_sklearn,
+    ("sklearn.pipeline", "Pipeline"): from_sklearn,
     ("simpful.simpful", "FuzzySystem"): from_simpful,
     ("skfuzzy.control.controlsystem", "ControlSystem"): from_skfuzzy,
     ("skfuzzy.control.controlsystem", "ControlSystemSimulation"): from_skfuzzy,

@@ -10,13 +10,17 @@ stands for a missing one, and reads directions that one value takes (`_stand_ins
 node that separates missing values from all others has the threshold infinity; ours has
 a cut at 2**127 instead, below which all other values are.
 
+Scalers before the tree are folded into its cuts: a cut becomes the largest double that
+they bring to it or below (`_folded`).
+
 The library itself is not imported: what is read are the arrays of a fitted tree.
 """
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import msgspec
@@ -31,6 +35,7 @@ from fuzzytree.model import (
     Branch,
     FloatArray,
     FuzzyTree,
+    IntArray,
     LabelType,
     Leaf,
     Node,
@@ -44,6 +49,8 @@ from fuzzytree.model import (
 )
 
 _BEYOND = 2.0**128  # where the floats of 32 bits would go on
+_LARGEST = np.finfo(np.float64).max
+_SCALERS = ("StandardScaler", "MinMaxScaler", "MaxAbsScaler", "RobustScaler")
 _MISSING = 2.0**127  # the cut above which a value counts as missing
 
 
@@ -57,7 +64,7 @@ def from_sklearn(
     name: str = "scikit-learn tree",
     missing: str | None = None,
 ) -> FuzzyTree:
-    """Return a fitted `DecisionTreeClassifier` as a tree.
+    """Return a fitted `DecisionTreeClassifier`, alone or after scalers, as a tree.
 
     Its answers are those of `predict` at every finite double; a node that tests
     whether a value is missing takes those above 2**127 (1.7e38) for missing too. Rules
@@ -75,8 +82,12 @@ def from_sklearn(
     its directions are the library's habit, the child with more rows at each node, and
     is refused if they were learnt.
 
+    A `Pipeline` may have scalers before the tree: StandardScaler, MinMaxScaler,
+    MaxAbsScaler and RobustScaler. The cuts are in the columns' own units then, and the
+    answers those of the pipeline for rows of doubles.
+
     Args:
-        classifier: A fitted tree with one output.
+        classifier: A fitted tree with one output, or a pipeline that ends with it.
         columns: The name of each column that it was fitted on; its own names unless
             given, and without those x1, x2, ...
         classes: The name of each class, in the order of `classes_`; as they are
@@ -94,7 +105,8 @@ def from_sklearn(
             regressor.
         ValueError: If it is not fitted, or names or widths do not fit.
         LossError: If it has several outputs, or has learnt directions of missing
-            values that no single value takes.
+            values that no single value takes; if a pipeline has another step, or a
+            scaler that clips.
 
     Example:
         >>> from sklearn.tree import DecisionTreeClassifier
@@ -104,10 +116,13 @@ def from_sklearn(
           low: soft [1]
           high: firm [2]
     """
-    grown = _grown(classifier)
-    named = _Names.of(grown, columns, classes)
+    last, scalers = _last_step(classifier)
+    grown = _grown(last)
+    named = _Names.of(grown, [*scalers.values(), grown][0], columns, classes)
     arrays = _Arrays.of(grown.tree_, len(named.classes))
     used = arrays.used(named)
+    if scalers:
+        arrays = _folded(arrays, scalers, len(named.columns))
     widths = _widths(used, named, soft, spreads)
     instead = {} if missing is not None else _stand_ins(arrays, named)
     nodes, leaves = _nodes(arrays, named)
@@ -154,15 +169,34 @@ def exact_cut(threshold: float) -> float:
     return middle if is_even else math.nextafter(middle, -math.inf)
 
 
+def _kinds(thing: object) -> list[str]:
+    """Return the names of the library's classes that an object belongs to."""
+    parents = [c for c in type(thing).__mro__ if c.__module__.startswith("sklearn.")]
+    return [parent.__name__ for parent in parents]
+
+
+def _last_step(classifier: Any) -> tuple[object, dict[str, Any]]:
+    """Return the last step of a pipeline, and the scalers before it by name."""
+    if "Pipeline" not in _kinds(classifier):
+        return classifier, {}
+    *before, (_, last) = classifier.steps
+    scalers = {n: step for n, step in before if step not in (None, "passthrough")}
+    for name, step in scalers.items():
+        kind = type(step).__name__
+        where = f"cannot read a Pipeline with the step {name!r}, a {kind}"
+        if kind not in _SCALERS or kind not in _kinds(step):
+            raise LossError(f"{where}: before a tree stand {', '.join(_SCALERS)}")
+        if getattr(step, "clip", False):
+            raise LossError(f"{where} that clips: it needs clip=False")
+        if not hasattr(step, "n_features_in_"):
+            raise ValueError(f"the {kind} is not fitted")
+    return last, scalers
+
+
 def _grown(classifier: object) -> Any:
     """Return a classifier that can be read, or say why it cannot."""
     kind = type(classifier).__name__
-    names = {
-        one.__name__
-        for one in type(classifier).__mro__
-        if one.__module__.startswith("sklearn.")
-    }
-    if "DecisionTreeClassifier" not in names:
+    if "DecisionTreeClassifier" not in _kinds(classifier):
         raise TypeError(
             f"from_sklearn reads a DecisionTreeClassifier, and not a {kind}"
         )
@@ -185,10 +219,13 @@ class _Names(NamedTuple):
 
     @staticmethod
     def of(
-        grown: Any, columns: Sequence[str] | None, classes: Sequence[str] | None
+        grown: Any,
+        first_step: Any,
+        columns: Sequence[str] | None,
+        classes: Sequence[str] | None,
     ) -> _Names:
         count = int(grown.n_features_in_)
-        own = getattr(grown, "feature_names_in_", None)
+        own = getattr(first_step, "feature_names_in_", None)
         if columns is None and own is not None:
             columns = [str(one) for one in own]
         if columns is None:
@@ -250,6 +287,60 @@ class _Arrays(NamedTuple):
             {c for c, start in zip(self.column, self.left, strict=True) if start >= 0}
         )
         return {named.columns[place]: place for place in places}
+
+
+def _folded(arrays: _Arrays, scalers: Mapping[str, Any], width: int) -> _Arrays:
+    """Return a tree with cuts for values before they are scaled.
+
+    A cut becomes the largest double that is not scaled above it. Rounding keeps the
+    order of numbers, so all are bisected together, by their places among all doubles.
+    """
+    nodes = [n for n, start in enumerate(arrays.left) if start >= 0]
+    nodes = [n for n in nodes if arrays.cut[n] != _MISSING]
+    nodes.sort(key=arrays.column.__getitem__)
+    columns = np.array([arrays.column[n] for n in nodes], dtype=np.int64)
+    bars = np.array([arrays.cut[n] for n in nodes])
+    steps = [_scale(name, scaler, columns) for name, scaler in scalers.items()]
+    rows = np.arange(len(nodes)) - np.searchsorted(columns, columns)
+    table = np.zeros((int(rows.max(initial=0)) + 1, width))
+    high = np.full(len(nodes), _LARGEST).view(np.int64)
+    low = -high
+    while (low < high).any():
+        middle = (low | high) - ((low ^ high) >> 1)
+        table[rows, columns] = _doubles(middle)
+        values = table
+        for step in steps:
+            values = step(values)
+        is_above = values[rows, columns] > bars
+        low = np.where(is_above, low, middle)
+        high = np.where(is_above, middle - 1, high)
+    cuts = arrays.cut.copy()
+    for node, cut in zip(nodes, _doubles(low).tolist(), strict=True):
+        cuts[node] = cut
+    return arrays._replace(cut=cuts)
+
+
+def _doubles(places: IntArray) -> FloatArray:
+    """Return the doubles at places counted from 0.0."""
+    return np.copysign(np.abs(places).view(np.float64), places)
+
+
+def _scale(name: str, scaler: Any, columns: IntArray) -> Callable[..., FloatArray]:
+    """Return what a scaler does to rows, with results beyond all doubles clipped."""
+    if scaler.scale_ is not None and not (scaler.scale_[columns] > 0.0).all():
+        raise LossError(
+            f"cannot read a Pipeline whose step {name!r} does not increase with a "
+            "column: its scale_ must be above 0"
+        )
+    nameless = copy.copy(scaler)
+    vars(nameless).pop("feature_names_in_", None)  # arrays have none, it would warn
+
+    def scale(values: FloatArray) -> FloatArray:
+        with np.errstate(over="ignore"):
+            scaled: FloatArray = np.asarray(nameless.transform(values.copy()))
+        return scaled.clip(-_LARGEST, _LARGEST)
+
+    return scale
 
 
 def _shares(values: FloatArray) -> list[tuple[float, ...]]:

@@ -142,9 +142,9 @@ def test_every_verb_refuses_what_is_no_model_with_one_sentence(verb: str) -> Non
         VERBS[verb]([FITTED])
     assert str(caught.value) == (
         "a model is a FuzzyTree, a RuleBase, a FuzzySystem, a fitted "
-        "FuzzyTreeClassifier or DecisionTreeClassifier, a ControlSystem of "
-        "scikit-fuzzy, a FuzzySystem of simpful, or the path of a file, and not "
-        "a value of type list"
+        "FuzzyTreeClassifier or DecisionTreeClassifier, a Pipeline that ends with the "
+        "latter, a ControlSystem of scikit-fuzzy, a FuzzySystem of simpful, or the "
+        "path of a file, and not a value of type list"
     )
 
 

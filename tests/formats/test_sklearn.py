@@ -24,6 +24,9 @@ from fuzzytree.semantics.reference import Status, descend, evaluate
 
 ensemble = pytest.importorskip("sklearn.ensemble")
 trees = pytest.importorskip("sklearn.tree")
+pipelines = pytest.importorskip("sklearn.pipeline")
+scaling = pytest.importorskip("sklearn.preprocessing")
+base = pytest.importorskip("sklearn.base")
 
 
 def single(value: float) -> float:
@@ -323,6 +326,112 @@ def test_several_outputs_are_refused() -> None:
         from_sklearn(tree)
     assert str(caught.value) == (
         "cannot read a DecisionTreeClassifier with 2 outputs: a tree has one"
+    )
+
+
+SCALERS: dict[str, list[Any]] = {
+    "standard": [scaling.StandardScaler()],
+    "without mean": [scaling.StandardScaler(with_mean=False, copy=False)],
+    "minmax": [scaling.MinMaxScaler(feature_range=(-3, 7), copy=False)],
+    "maxabs": [scaling.MaxAbsScaler()],
+    "robust": [scaling.RobustScaler(with_centering=False), "passthrough"],
+    "unscaled": [None, scaling.RobustScaler(with_scaling=False)],
+    "two": [scaling.RobustScaler(), scaling.MinMaxScaler()],
+}
+
+
+def pipeline(steps: list[Any], **options: Any) -> tuple[Any, np.ndarray[Any, Any]]:
+    """A pipeline, and the table that it was fitted on."""
+    chance = np.random.default_rng(5)
+    values = chance.normal(size=(200, 4)) * [1e-5, 1.0, 1e6, 30.0] + [0, 1, 1e8, -4]
+    tree = trees.DecisionTreeClassifier(random_state=0, **options)
+    fitted = pipelines.make_pipeline(*(base.clone(s, safe=False) for s in steps), tree)
+    return fitted.fit(values.copy(), chance.integers(0, 3, 200)), values
+
+
+@pytest.mark.parametrize("name", SCALERS)
+def test_a_pipeline_is_answered_as_its_predict_at_and_beside_every_cut(
+    name: str,
+) -> None:
+    grown, values = pipeline(SCALERS[name], max_leaf_nodes=40)
+    ours = from_sklearn(grown)
+    marks = [column.tolist() for column in values.T]
+    for node in ours.nodes:
+        (cut,) = node.cuts
+        beside = [math.nextafter(cut, way) for way in (-math.inf, math.inf)]
+        marks[ours.columns.index(node.variable)] += [cut, *beside] * 10
+    chance = np.random.default_rng(0)
+    rows = np.column_stack([chance.choice(column, 4000) for column in marks])
+    assert fuzzytree.run(grown, rows).classes == grown.predict(rows.copy()).tolist()
+    assert len(ours.leaves) == 40
+
+
+def test_a_pipeline_keeps_the_names_of_its_table_and_where_missing_values_go() -> None:
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"force": [1.0, 2.0, math.nan, 9.0], "b": [0.0] * 4})
+    grown = pipelines.make_pipeline("passthrough", *SCALERS["two"])
+    grown.steps.append(("tree", trees.DecisionTreeClassifier(max_depth=2)))
+    grown.set_output(transform="pandas").fit(table, ["a", "b", "b", "b"])
+    ours = from_sklearn(grown, soft={"force": 0.1})
+    assert ours.columns == ("force", "b")
+    assert list(ours.nodes[0].cuts) == pytest.approx([1.5])
+    assert descend(ours, {"force": math.nan}).label == grown.predict(table)[2] == "b"
+
+
+def test_a_pipeline_may_have_one_leaf() -> None:
+    grown, _ = pipeline(SCALERS["two"], min_samples_leaf=200)
+    ours = from_sklearn(grown)
+    assert (ours.nodes, len(ours.leaves)) == ((), 1)
+
+
+STANDING = "StandardScaler, MinMaxScaler, MaxAbsScaler, RobustScaler"
+
+
+# A class of somebody else, whose transform may be anything.
+Scaler = type("Scaler", (scaling.StandardScaler,), {})
+
+
+@pytest.mark.parametrize(
+    ("step", "text"),
+    [
+        (
+            scaling.PowerTransformer(),
+            f"a PowerTransformer: before a tree stand {STANDING}",
+        ),
+        (Scaler(), f"a Scaler: before a tree stand {STANDING}"),
+        (
+            scaling.MinMaxScaler(clip=True),
+            "a MinMaxScaler that clips: it needs clip=False",
+        ),
+    ],
+)
+def test_other_steps_of_a_pipeline_are_refused(step: Any, text: str) -> None:
+    grown, _ = pipeline([step], max_depth=1)
+    with pytest.raises(LossError) as caught:
+        from_sklearn(grown)
+    name = grown.steps[0][0]
+    assert str(caught.value) == f"cannot read a Pipeline with the step {name!r}, {text}"
+
+
+def test_a_scaler_that_turns_a_column_round_is_refused() -> None:
+    grown, _ = pipeline([scaling.StandardScaler()], max_depth=1)
+    grown[0].scale_ = -grown[0].scale_
+    with pytest.raises(LossError) as caught:
+        from_sklearn(grown)
+    assert str(caught.value) == (
+        "cannot read a Pipeline whose step 'standardscaler' does not increase with a "
+        "column: its scale_ must be above 0"
+    )
+
+
+def test_a_pipeline_that_is_not_fitted_or_ends_otherwise_is_refused() -> None:
+    tree = trees.DecisionTreeClassifier()
+    with pytest.raises(ValueError, match="the StandardScaler is not fitted"):
+        from_sklearn(pipelines.make_pipeline(scaling.StandardScaler(), tree))
+    with pytest.raises(TypeError) as caught:
+        from_sklearn(pipelines.make_pipeline(ensemble.RandomForestClassifier()))
+    assert str(caught.value) == (
+        "from_sklearn reads a DecisionTreeClassifier, and not a RandomForestClassifier"
     )
 
 
