@@ -42,6 +42,10 @@ class BinaryTree:
         """How many leaves there are."""
         return sum(split is None for split in self.splits)
 
+    def is_alike(self, other: BinaryTree) -> bool:
+        """Return whether two prunings of a tree have kept the same splits."""
+        return [*map(id, self.splits)] == [*map(id, other.splits)]
+
     def add(self, rows: TrainingRows, at: IntArray) -> int:
         """Add a leaf of some rows and return its number."""
         counts = tallied(rows.codes[at], rows.weights[at], rows.classes)

@@ -235,7 +235,8 @@ def _best_size(
         if sizes == leaves:
             continue
         leaves = sizes
-        trial = _tried(rows, folds, style, cost, smaller, _LOOSE, min_rows)
+        last = trials[-1] if trials else None
+        trial = _tried(rows, folds, style, cost, smaller, _LOOSE, min_rows, last)
         trials.append(trial)
         if trial.score > trials[best].score:
             best = len(trials) - 1
@@ -252,18 +253,26 @@ def _tried(
     trees: list[BinaryTree],
     penalty: float,
     min_rows: int,
+    last: _Trial | None = None,
 ) -> _Trial:
-    """Tune the tree of each fold and let it answer the rows held out."""
-    crisp: list[BinaryTree] = []
-    right: list[BoolArray] = []
-    likely: list[FloatArray] = []
-    for tree, fold in zip(trees, folds, strict=True):
+    """Tune the tree of each fold and let it answer the rows held out.
+
+    A tree that the last trial has tuned, as firmly, is taken from there.
+    """
+    ends = np.cumsum([len(fold.left_out) for fold in folds])[:-1]
+    crisp: list[BinaryTree] = [] if last is None else [*last.crisp]
+    right = [] if last is None else np.split(last.is_right, ends)
+    likely = [] if last is None else np.split(last.likely, ends)
+    for number, (tree, fold) in enumerate(zip(trees, folds, strict=True)):
+        if last is not None and tree.is_alike(last.trees[number]):
+            continue
         soft = SoftTree.of(tree, rows, fold.learnt).tuned(penalty)
-        crisp.append(soft.crisp(min_rows))
+        at = slice(number, number + 1)
+        crisp[at] = [soft.crisp(min_rows)]
         codes = rows.codes[fold.left_out]
-        right.append(crisp[-1].answers(rows, fold.left_out) == codes)
+        right[at] = [crisp[number].answers(rows, fold.left_out) == codes]
         own = soft.chances(fold.left_out)[np.arange(len(codes)), codes]
-        likely.append(np.log(np.maximum(own, _UNLIKELY)))
+        likely[at] = [np.log(np.maximum(own, _UNLIKELY))]
     weights = rows.weights[np.concatenate([fold.left_out for fold in folds])]
     joined = np.concatenate(right), np.concatenate(likely)
     return _Trial(style, cost, penalty, trees, crisp, *joined, weights)

@@ -123,29 +123,30 @@ def selected_columns(
         costs: Per column.
     """
     means, rest = _two_groups(points, is_right, weights, rules.shrinkage)
-    original = np.diag(rest).copy()
     step = means[1] - means[0]
     share = float(weights[is_right].sum() / weights.sum())
     factor = share * (1.0 - share)
     prices = np.maximum(costs, _CHEAPEST)
     selected: list[int] = []
     power = 0.0
+    least = _OWN * np.diag(rest)
+    variances = np.einsum("ii->i", rest)  # a view: `rest` changes in place
+    gains = np.zeros(len(step))
     for _ in range(min(rules.columns, MOST_COLUMNS, len(step))):
-        variances = np.einsum("ii->i", rest)
-        is_free = variances > _OWN * original
-        is_free[selected] = False
-        gains = np.where(is_free, step**2 / np.where(is_free, variances, 1.0), 0.0)
-        best = int(np.argmax(np.round(gains / prices, 12)))
+        gains.fill(0.0)
+        np.divide(step * step, variances, out=gains, where=variances > least)
+        best = int((gains / prices).round(12).argmax())
         gain = float(gains[best])
         freedom = max(len(points) - 2 - len(selected), 1.0)
         helps = freedom * factor * gain / (1.0 + factor * power) / prices[best]
         if gain <= 0.0 or (selected and helps < rules.entry):
             break
         selected.append(best)
+        least[best] = np.inf
         power += gain
         column = rest[:, best] / rest[best, best]
         step = step - column * step[best]
-        rest = rest - np.outer(column, rest[best])
+        rest -= column[:, None] * rest[best]
     return np.array(selected or [0], np.int64)
 
 
@@ -202,12 +203,13 @@ def _logistic(
     share = weights / weights.mean()
     penalty = np.full(design.shape[1], ridge)
     penalty[-1] = 1e-6
+    penalties = np.diag(penalty)
     solution = np.zeros(design.shape[1])
     for _ in range(_NEWTON_STEPS):
         chance = 1.0 / (1.0 + np.exp(-np.clip(design @ solution, -30.0, 30.0)))
         slope = design.T @ (share * (is_right - chance)) - penalty * solution
         steep = share * np.maximum(chance * (1.0 - chance), 1e-4)
-        curvature = (design * steep[:, None]).T @ design + np.diag(penalty)
+        curvature = (design * steep[:, None]).T @ design + penalties
         try:
             step = np.linalg.solve(curvature, slope)
         except np.linalg.LinAlgError:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.learning import LearningSettings, learn_arrays
-from fuzzytree.learning.binary import BinaryTree, GrowingTree
+from fuzzytree.learning.binary import BinaryTree, GrowingTree, pruned
 from fuzzytree.learning.learner import ArrayLearner
 from fuzzytree.learning.rows import SplitRules, TrainingRows
 from fuzzytree.learning.tuning import SHARPNESS, SoftTree
@@ -70,6 +70,13 @@ def test_a_tuned_tree_gives_its_rows_better_chances() -> None:
     assert {k: crisp.labels[k] for k in leaves} == {
         k: int(np.bincount(rows.codes[reached[k]]).argmax()) for k in leaves
     }
+
+
+def test_prunings_are_alike_if_they_keep_the_same_splits() -> None:
+    tree, _ = _grown(*_rings(200, 1))
+    assert pruned(tree, 8.0).is_alike(pruned(tree, 8.0))
+    assert not pruned(tree, 8.0).is_alike(pruned(tree, 0.0))
+    assert not pruned(tree, 8.0).is_alike(pruned(_grown(*_rings(200, 1))[0], 8.0))
 
 
 def test_a_branch_keeps_the_rows_that_are_wanted() -> None:
