@@ -53,11 +53,11 @@ def category_orders(
     values, codes = values[::step], codes[::step]
     targets = np.equal.outer(codes, np.unique(codes)).astype(np.float64)
     targets *= np.linspace(1.0, 1.0 + _TILT, targets.shape[1])
-    wanted = [k for k, n in enumerate(sizes) if 1 < n <= _MOST_ORDERED and len(codes)]
-    parts = np.cumsum([sizes[k] + 1 for k in wanted]) // _MOST_INDICATORS
+    narrow = [k for k, n in enumerate(sizes) if 1 < n <= _MOST_ORDERED and len(codes)]
+    parts = np.cumsum([sizes[k] + 1 for k in narrow]) // _MOST_INDICATORS
     result: dict[int, tuple[IntArray, bool]] = {}
     for part in np.unique(parts).tolist():
-        columns = [k for k, own in zip(wanted, parts, strict=True) if own == part]
+        columns = [k for k, own in zip(narrow, parts, strict=True) if own == part]
         if all(sizes[k] < 3 for k in columns):
             continue
         blocks = [np.ones((len(values), 1))]
@@ -95,8 +95,8 @@ def _orders(
         least = _LEAST_F * (len(moved) - 1) * noise
         _, axes = np.linalg.eigh((moved * counts).T @ moved)
         along = np.round(moved @ axes[:, -1], _DIGITS)
-        gone = (weights[end - 1] - weights[at].mean(axis=0)) @ axes[:, -1]
-        side = float(np.sign(np.round(gone, _DIGITS)) * block[:, -1].any())
+        absence = (weights[end - 1] - weights[at].mean(axis=0)) @ axes[:, -1]
+        side = float(np.sign(np.round(absence, _DIGITS)) * block[:, -1].any())
         ways = [np.argsort(sign * along, kind="stable") for sign in (1.0, -1.0)]
         far = side > 0, side < 0
         best = min((0, 1), key=lambda way: (far[way], ways[way].tolist()))

@@ -127,9 +127,9 @@ def components(
     labels = np.empty(len(means), np.int64)
     total = 0
     for piece in np.split(order, np.flatnonzero(breaks)):
-        found = _connected(first[piece], second[piece], limit)
-        labels[piece] = found + total
-        total += int(found.max()) + 1
+        numbers = _connected(first[piece], second[piece], limit)
+        labels[piece] = numbers + total
+        total += int(numbers.max()) + 1
     lowest = np.full(total, np.inf)
     np.minimum.at(lowest, labels, first)
     rank = np.argsort(np.argsort(lowest, kind="stable"), kind="stable")
@@ -222,8 +222,8 @@ def grow(
     settled = 0
     while todo:
         chosen, level, parent, branch = todo.pop()
-        found = _split_at(patterns, chosen, level, rules, grown)
-        if found is None:
+        best = _split_at(patterns, chosen, level, rules, grown)
+        if best is None:
             place = ~len(sketch.leaves)
             sketch.leaves.append(chosen)
             labels = patterns.labels[chosen]
@@ -235,7 +235,7 @@ def grow(
             if progress is not None:
                 progress(settled / len(everything))
         else:
-            split, level = found
+            split, level = best
             place = len(sketch.splits)
             sketch.splits.append(split)
             sketch.children.append([0] * len(split.groups))
@@ -312,27 +312,27 @@ def _best_split(
 ) -> TreeSplit | None:
     """Return the split by the most powerful feature at a level, or None."""
     limits = threshold(features.spreads, rules.l_max, level)
-    found = most_powerful(
+    grouping = most_powerful(
         features.means,
         features.spreads,
         limits,
         alpha=rules.alpha,
         costs=features.costs,
     )
-    if found is None:
+    if grouping is None:
         return None
     group_of = np.zeros(len(chosen), np.int64)
-    for number, group in enumerate(found.groups):
+    for number, group in enumerate(grouping.groups):
         group_of[group] = number
     cuts = crossing_cuts(
-        features.means[:, found.feature],
-        features.spreads[:, found.feature],
+        features.means[:, grouping.feature],
+        features.spreads[:, grouping.feature],
         group_of,
         keep_reversals=rules.keep_reversals,
     )
     grown.reversals += cuts.reversals
-    groups = tuple(chosen[group] for group in found.groups)
-    return finished_split(patterns, features.axes(found.feature), cuts, groups)
+    groups = tuple(chosen[group] for group in grouping.groups)
+    return finished_split(patterns, features.axes(grouping.feature), cuts, groups)
 
 
 def _combinations(
