@@ -123,10 +123,12 @@ def _saved_booster(model: Any) -> tuple[bytes, str] | None:
     }
     if "xgboost" in packages:
         booster = model.get_booster() if hasattr(model, "get_booster") else model
-        return bytes(booster.save_raw("json")), ".json"
+        if hasattr(booster, "save_raw"):
+            return bytes(booster.save_raw("json")), ".json"
     if "lightgbm" in packages:
         booster = model.booster_ if hasattr(type(model), "booster_") else model
-        return booster.model_to_string().encode(), ".txt"
+        if hasattr(booster, "model_to_string"):
+            return booster.model_to_string().encode(), ".txt"
     return None
 
 

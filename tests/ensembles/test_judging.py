@@ -318,6 +318,16 @@ def test_objects_of_boosters_are_compared_as_their_files(tmp_path: Path) -> None
             assert verdicts(found, "scores") == {"PROVED"}
 
 
+def test_data_of_boosters_are_no_trees(tmp_path: Path) -> None:
+    lightgbm, xgboost = map(pytest.importorskip, ("lightgbm", "xgboost"))
+    path = written(
+        DecisionTreeClassifier().fit([[0], [1]], [0, 1]), 1, tmp_path / "m.onnx"
+    )
+    for data in (xgboost.DMatrix(np.zeros((2, 1))), lightgbm.Dataset(np.zeros((2, 1)))):
+        with pytest.raises(TypeError):
+            check(data, path)
+
+
 def test_graphs_of_onnxmltools_are_read_to_their_end(tmp_path: Path) -> None:
     lightgbm, onnxmltools = map(pytest.importorskip, ("lightgbm", "onnxmltools"))
     types = importlib.import_module("onnxmltools.convert.common.data_types")
