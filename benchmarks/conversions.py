@@ -44,12 +44,13 @@ PACKAGES = (
     *("scikit-learn", "skl2onnx", "onnx", "onnxruntime", "onnxmltools", "xgboost"),
     *("lightgbm", "treelite", "m2cgen", "protobuf", "hummingbird-ml"),
 )
+TYPES = ("float32", "float64")
 KINDS = {f"D{number}" for number in range(1, 10)}
 QUESTIONS = ("routes", "scores", "labels", "missing values")
 COUNT = 2_000  # rows at and beside cuts
 ROUNDING = 1e-4  # of a probability or a number; beyond it a row differs
 HEADS = {
-    "kinds": ("kind", "model", "converter", *QUESTIONS, "rows that differ"),
+    "kinds": ("kind", "model", "converter", "PROVED", *TYPES),
     "right": ("model", "converter", "leaves", *QUESTIONS),
 }
 WORDS = {
@@ -435,25 +436,31 @@ def cells(line: Figures) -> list[str]:
     """Return the cells of a line of a table.
 
     Example:
-        >>> answers = {"routes": ["PROVED", "DIFFER"]}
-        >>> cells({"kind": "", "model": "m", "converter": "c", "answers": answers})
-        ['m', 'c', '', 'PROVED, DIFFER', '', '', '']
+        >>> answers = {"routes": ["PROVED", "PROVED"], "scores": ["PROVED", "open"]}
+        >>> line = {"model": "m", "converter": "c", "answers": answers}
+        >>> cells({**line, "kind": ""})
+        ['m', 'c', '', 'PROVED', 'PROVED, open', '', '']
+        >>> cells({**line, "kind": "D1", "differing": {"float32": {"labels": 2}}})
+        ['D1', 'm', 'c', 'routes', '2 labels', '']
     """
-    answers = [
-        ", ".join(dict.fromkeys(line.get("answers", {}).get(question, [])))
-        for question in QUESTIONS
+    answers = line.get("answers", {})
+    head = [line["model"], line["converter"]]
+    if not line["kind"]:
+        leaves = f"{line['leaves']:,}" if "leaves" in line else ""
+        verdicts = [
+            ", ".join(dict.fromkeys(answers.get(each, []))) for each in QUESTIONS
+        ]
+        return [*head, leaves, *verdicts]
+    proved = [each for each in QUESTIONS if {*answers.get(each, [])} == {"PROVED"}]
+    shown = ", ".join(proved) or ("nothing" if answers else "")
+    differing = line.get("differing", {})
+    rows = [in_words(differing[each]) if each in differing else "" for each in TYPES]
+    return [
+        line["kind"],
+        *head,
+        shown,
+        *([line["remark"], ""] if "remark" in line else rows),
     ]
-    if line["kind"]:
-        counts = {
-            kind: in_words(each) for kind, each in line.get("differing", {}).items()
-        }
-        rows = "<br>".join(f"{kind}: {text}" for kind, text in counts.items())
-        if len({*counts.values()}) == 1:
-            rows = "both: " + next(iter(counts.values()))
-        rows = line.get("remark", rows)
-        return [line["kind"], line["model"], line["converter"], *answers, rows]
-    leaves = f"{line['leaves']:,}" if "leaves" in line else ""
-    return [line["model"], line["converter"], leaves, *answers]
 
 
 def in_words(counts: Mapping[str, int]) -> str:

@@ -41,7 +41,7 @@ def test_a_case_without_its_package_is_not_run() -> None:
     case = module.Case("D9", "a forest", "nothing", "no-such-package", _fail)
     line = module.judged(case)
     assert line["remark"] == "not run: no-such-package is not installed"
-    assert module.cells(line)[-1] == line["remark"]
+    assert line["remark"] in module.cells(line)
 
 
 def _fail(_folder: Path) -> module.Figures:
@@ -85,13 +85,13 @@ def test_three_kinds_are_found_again(
     monkeypatch.setattr("sys.argv", ["conversions.py", "--only", "D1,D2,D5"])
     module.main()
     lines = [line.split(" | ") for line in capsys.readouterr().out.splitlines()]
-    differ = {
-        (line[0], line[2]): line[3:7]
+    proved = {
+        (line[0], line[2]): line[3]
         for line in lines
         if line[2] in ("skl2onnx", "onnxmltools")
     }
-    assert differ == {
-        ("D1", "skl2onnx"): ["PROVED", "PROVED", "PROVED", "DIFFER"],
-        ("D1, D2", "skl2onnx"): ["PROVED", "PROVED", "DIFFER", "DIFFER"],
-        ("D5", "onnxmltools"): ["DIFFER"] * 4,
+    assert proved == {
+        ("D1", "skl2onnx"): "routes, scores, labels",
+        ("D1, D2", "skl2onnx"): "routes, scores",
+        ("D5", "onnxmltools"): "nothing",
     }
