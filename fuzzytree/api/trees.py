@@ -24,6 +24,7 @@ def check_trees(
     others: Sequence[Carried],
     data: object,
     names: Sequence[str],
+    runtimes: Sequence[str] | None,
     limit: int | None,
 ) -> TreeAgreement | None:
     """Compare two tree ensembles; None if neither of two sources is one of others.
@@ -33,12 +34,14 @@ def check_trees(
         others: As `check` takes them.
         data: A table whose rows are run as well.
         names: What to call each of the others.
+        runtimes: None, as these trees run in their own programs.
         limit: The most generated rows.
 
     Raises:
         LossError: If there are not two, or they cannot be compared.
         ReadError: If a file cannot be read.
         TableError: If the table has too few columns.
+        ValueError: If a runtime is named.
     """
     first = ensembles.opened(model)
     second = ensembles.opened(others[0]) if len(others) == 1 else None
@@ -50,6 +53,8 @@ def check_trees(
             f"{name}: trees of other libraries are compared with one other file or "
             f"estimator, and not with {len(others)}"
         )
+    if runtimes is not None:
+        raise ValueError("runtimes: trees of other libraries run in their own programs")
     first = first or _of_ours(model)
     second = second or _of_ours(others[0])
     if names:

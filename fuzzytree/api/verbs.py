@@ -427,7 +427,7 @@ def check(
     """
     check_arguments(check, options, CheckArguments)
     chosen = with_arguments(settings or CheckSettings(), options)
-    trees = check_trees(model, others, data, as_names(names), chosen.limit)
+    trees = check_trees(model, others, data, as_names(names), runtimes, chosen.limit)
     if trees is not None:
         return trees
     first = checking.as_model(model, allow_loss=allow_loss)

@@ -35,6 +35,14 @@ from fuzzytree.model import version as own_version
 _MOST_UNPACKED = 1 << 30  # bytes of a .skops file
 _MOST_MEMBERS = 100_000
 _TRUSTED = ("sklearn.ensemble.", "sklearn.tree.", "sklearn._loss.")
+_PICKLE = (
+    "is a pickle, which runs what it holds when it is loaded; write the estimator as "
+    ".skops: skops.io.dump(model, 'model.skops')"
+)
+_OTHER_FILES = {
+    **dict.fromkeys((".joblib", ".pickle", ".pkl"), _PICKLE),
+    ".ubj": "is XGBoost's binary format; write JSON: booster.save_model('model.json')",
+}
 _TREES = b"TreeEnsemble"
 _OWN_KEY = b"fuzzytree.format"  # in ONNX files that fuzzytree wrote
 
@@ -100,6 +108,8 @@ def opened(source: object) -> Opened | None:
     if not isinstance(source, str | os.PathLike):
         return None
     name, suffix = str(os.fspath(source)), Path(source).suffix.lower()
+    if suffix in _OTHER_FILES:
+        raise ReadError(f"{name}: {_OTHER_FILES[suffix]}")
     if suffix == ".skops":
         return _of_estimator(_unpacked(read_bounded(source), name), name)
     if suffix == ".onnx":

@@ -15,6 +15,10 @@ from fuzzytree.model import FloatArray
 
 _FORESTS = ("RandomForest", "ExtraTrees")
 _SINGLE_TREES = ("DecisionTree", "ExtraTree")
+_FILES = {
+    "xgboost": "model.save_model('model.json')",
+    "lightgbm": "model.booster_.save_model('model.txt')",
+}
 _AT_ZERO = -5e-324  # a score of 0 is above it
 
 
@@ -43,6 +47,11 @@ def from_estimator(model: Any, name: str = "the estimator") -> Ensemble:
     )
     family = kind.removesuffix("Classifier").removesuffix("Regressor")
     reader = _READERS.get(family)
+    package = type(model).__module__.partition(".")[0]
+    if package in _FILES:
+        raise LossError(
+            f"{name}: trees of {package} are read from its file: {_FILES[package]}"
+        )
     if reader is None:
         known = ", ".join(f"{each}Classifier and Regressor" for each in _READERS)
         raise LossError(f"{name}: a {kind} is no tree that is read here: {known}")

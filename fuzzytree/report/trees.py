@@ -87,5 +87,6 @@ def _row_text(
     shown = cells if is_verbose else cells[:_MOST_VALUES]
     more = len(cells) - len(shown)
     rest = f"{more} more are not 0" if more else "all others are 0"
+    rest = rest if cells else "all values are 0"
     is_all = len(cells) == len(row) and not more
     return ", ".join(shown if is_all else [*shown, rest])

@@ -252,3 +252,33 @@ def test_indices_of_a_skops_file_that_lead_out_of_a_tree_are_refused(
     path.write_bytes(skops_file(model))
     with pytest.raises(ReadError, match="child of a node"):
         opened(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("m.pkl", "skops.io.dump"),
+        ("m.joblib", "skops.io.dump"),
+        ("m.ubj", "save_model"),
+    ],
+)
+def test_files_that_are_not_read_name_what_is(name: str, words: str) -> None:
+    with pytest.raises(ReadError, match=words):
+        opened(name)
+
+
+def test_estimators_of_boosters_are_read_from_their_files() -> None:
+    xgboost = pytest.importorskip("xgboost")
+    model = xgboost.XGBClassifier(n_estimators=2).fit(*IRIS)
+    with pytest.raises(LossError, match="model.save_model"):
+        opened(model)
+
+
+def test_settings_of_models_of_ours_are_refused(tmp_path: Path) -> None:
+    model = DecisionTreeClassifier().fit(*IRIS)
+    path = written(model, 4, tmp_path / "m.onnx")
+    with pytest.raises(ValueError, match="runtimes: trees of other libraries"):
+        ft.check(model, path, runtimes=["native"])
+    forest = RandomForestClassifier(2).fit(*IRIS)
+    with pytest.raises(LossError, match="one other file or estimator, and not with 0"):
+        ft.check(forest)
