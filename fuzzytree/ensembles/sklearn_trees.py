@@ -15,19 +15,17 @@ from fuzzytree.model import FloatArray
 
 _FORESTS = ("RandomForest", "ExtraTrees")
 _SINGLE_TREES = ("DecisionTree", "ExtraTree")
-_FILES = {
-    "xgboost": "model.save_model('model.json')",
-    "lightgbm": "model.booster_.save_model('model.txt')",
-}
 _AT_ZERO = -5e-324  # a score of 0 is above it
 
 
 def is_sklearn(model: object) -> bool:
-    """Return whether an object is of scikit-learn."""
-    return any(
-        parent.__module__.startswith("sklearn.")
-        for parent in inspect.getmro(type(model))
-    )
+    """Return whether an object is an estimator of scikit-learn, and no model here."""
+    if hasattr(model, "__fuzzytree__"):
+        return False
+    parents = inspect.getmro(type(model))
+    if any(parent.__name__ == "Pipeline" for parent in parents):
+        return False  # of scalers and a tree: `from_sklearn` folds them
+    return any(parent.__module__.startswith("sklearn.") for parent in parents)
 
 
 def from_estimator(model: Any, name: str = "the estimator") -> Ensemble:
@@ -47,11 +45,6 @@ def from_estimator(model: Any, name: str = "the estimator") -> Ensemble:
     )
     family = kind.removesuffix("Classifier").removesuffix("Regressor")
     reader = _READERS.get(family)
-    package = type(model).__module__.partition(".")[0]
-    if package in _FILES:
-        raise LossError(
-            f"{name}: trees of {package} are read from its file: {_FILES[package]}"
-        )
     if reader is None:
         known = ", ".join(f"{each}Classifier and Regressor" for each in _READERS)
         raise LossError(f"{name}: a {kind} is no tree that is read here: {known}")

@@ -20,6 +20,8 @@ from sklearn.ensemble import (
     RandomForestClassifier,
 )
 from sklearn.linear_model import LogisticRegression
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from sklearn.tree import DecisionTreeClassifier
 
 import fuzzytree as ft
@@ -267,11 +269,14 @@ def test_files_that_are_not_read_name_what_is(name: str, words: str) -> None:
         opened(name)
 
 
-def test_estimators_of_boosters_are_read_from_their_files() -> None:
-    xgboost = pytest.importorskip("xgboost")
-    model = xgboost.XGBClassifier(n_estimators=2).fit(*IRIS)
-    with pytest.raises(LossError, match="save_model"):
-        opened(model)
+def test_a_pipeline_of_ours_is_compared_by_its_classes(tmp_path: Path) -> None:
+    model = make_pipeline(StandardScaler(), DecisionTreeClassifier()).fit(*IRIS)
+    bare = DecisionTreeClassifier(random_state=0).fit(*IRIS)
+    found = ft.check(model, written(bare, 4, tmp_path / "m.onnx"), limit=100)
+    assert isinstance(found, ft.model.TreeAgreement)
+    scaled = written(model, 4, tmp_path / "scaled.onnx")
+    with pytest.raises(ReadError, match="'Scaler' before the trees"):
+        ft.check(model, scaled)
 
 
 def test_settings_of_models_of_ours_are_refused(tmp_path: Path) -> None:
