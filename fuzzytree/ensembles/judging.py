@@ -133,6 +133,10 @@ def _one_score(ensemble: Ensemble) -> Ensemble:
     total = sum(float(share.max()) for share in shares) + float(ensemble.base.sum())
     if abs(total - 1.0) > 1e-6:
         raise LossError(f"{ensemble.name}: two scores that are no probabilities")
+    is_complement = all(
+        (share.max() - tree.values[:, 1] == tree.values[:, 0]).all()
+        for share, tree in zip(shares, ensemble.trees, strict=True)
+    )
     if len(ensemble.trees) == 1:
         lower, upper = ensemble.trees[0].values.T
         if ((upper > lower) != (upper > 0.5)).any():
@@ -143,7 +147,7 @@ def _one_score(ensemble: Ensemble) -> Ensemble:
         base=ensemble.base[1:],
         decides="above",
         bar=0.5,
-        label_slack=_COMPLEMENT,
+        label_slack=0.0 if is_complement else _COMPLEMENT,
     )
 
 
@@ -299,6 +303,9 @@ class _Judge:
     def _labels_of_sums(self, *, is_paired: bool) -> TreeAnswer:
         """Look for rows whose best classes are tied but for rounding."""
         one, two = self._one, self._two
+        if is_paired and self._is_exact():
+            text = "no sum of leaves is rounded, so scores and their ties are equal"
+            return self._proved("labels", text)
         slack = float(np.max(self._pair.allowed)) * (1 + (one.decides == "largest"))
         slack += one.label_slack + two.label_slack
         search = Search([one] if is_paired else [one, two], self._domain, slack)
@@ -319,6 +326,21 @@ class _Judge:
             text = f"{tied} rows within {slack:.2g} of a tie have one class in both"
         text = f"{search.looked_at:,} boxes of rows were searched; {text}"
         return self._answer("labels", "open", text)
+
+    def _is_exact(self) -> bool:
+        """Return whether both have the same trees, and add them without rounding."""
+        one, two = self._one, self._two
+        return (
+            one.is_exact()
+            and two.is_exact()
+            and one.label_slack == two.label_slack == 0.0
+            and np.array_equal(one.base, two.base)
+            and all(
+                is_same_shape(left, right, self._domain)
+                and np.array_equal(left.values, right.values)
+                for left, right in zip(one.trees, two.trees, strict=True)
+            )
+        )
 
     def _missing(self) -> TreeAnswer:
         """Compare rows with missing values: one of each column and side is enough."""

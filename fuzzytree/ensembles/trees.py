@@ -7,6 +7,7 @@ the exact cut, so that what is compared later are functions and not spellings.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -228,6 +229,18 @@ class Ensemble:
         largest = [np.abs(tree.values).max(axis=0) for tree in self.trees]
         total: FloatArray = np.sum(largest, axis=0, initial=0.0) + np.abs(self.base)
         return total
+
+    def is_exact(self) -> bool:
+        """Return whether no sum is rounded, whatever its order.
+
+        Multiples of a power of two have exact sums, if the mantissa of the number type
+        is wide enough for the largest one.
+        """
+        bits = 24 if self.unit == SINGLE else 53
+        _, exponent = math.frexp(float(np.max(self.sizes())))
+        step = 2.0 ** (exponent - bits)
+        parts = [self.base, *(tree.values for tree in self.trees)]
+        return self.link == "none" and all((part % step == 0).all() for part in parts)
 
     def rounding(self) -> FloatArray:
         """Return by how much its own sum can be off, for each score.

@@ -126,6 +126,17 @@ def test_ties_of_a_forest_are_rows_that_differ(tmp_path: Path) -> None:
     assert run(path.read_bytes(), row)[0] != model.predict(row)
 
 
+@pytest.mark.parametrize("table", [CANCER, IRIS])
+@pytest.mark.parametrize("count", [16, 20])
+def test_ties_are_equal_where_no_sum_is_rounded(
+    table: Any, count: int, tmp_path: Path
+) -> None:
+    rows, target = table
+    model = RandomForestClassifier(count, random_state=0).fit(rows, target)
+    found = check(model, written(model, rows.shape[1], tmp_path / "m.onnx"))
+    assert (verdicts(found, "labels") == {"PROVED"}) == (count == 16)
+
+
 def test_one_wrong_cut_is_a_row(tmp_path: Path) -> None:
     rows, target = CANCER
     model = RandomForestClassifier(5, max_depth=4, random_state=0).fit(rows, target)
