@@ -392,6 +392,7 @@ def right_cases() -> Iterator[Case]:
             by_skl2onnx,
         )
     for name, table, count in (
+        ("RandomForestClassifier", "digits", 128),
         ("GradientBoostingClassifier", "breast_cancer", 50),
         ("GradientBoostingClassifier", "iris", 10),
         ("ExtraTreesRegressor", "diabetes", 10),
