@@ -399,7 +399,8 @@ def right_cases() -> Iterator[Case]:
         ("RandomForestRegressor", "diabetes", 50),
     ):
         fit = partial(of_sklearn, name, table, n_estimators=count)
-        yield onnx_case("", f"{name}, {table}, {count} rounds", fit, by_skl2onnx)
+        parts = "rounds" if "Boosting" in name else "trees"
+        yield onnx_case("", f"{name}, {table}, {count} {parts}", fit, by_skl2onnx)
     for name, table, count in (
         ("XGBClassifier", "breast_cancer", 20),
         ("XGBClassifier", "iris", 10),
