@@ -70,6 +70,7 @@ from fuzzytree.semantics import (
 GRID_LIMIT = 1 << 21
 """The most points at which all cells are tried one by one; the proof needs no limit."""
 
+_DEGREES_AND_SHARES = 400_000_000  # in all probes of rules that have probabilities
 _SLOW_STEPS = 8_000_000  # of a program, by a slow runtime
 _SINGLE_EDGE = 1e-3  # share of the largest number; a wider bound says little
 _FEW = 200  # probes of a coverage alone
@@ -117,7 +118,7 @@ class Subject:
             if not model.rules:
                 self.tree = cast("FuzzyTree", model)
                 self.cells = semantics.cell_count(self.tree)
-            probes = probe_values(model, limit or MOST_PROBES)
+            probes = probe_values(model, limit or _most_probes(model))
         self.rows = row_set(model.inputs, probes, data)
         self.runs = {
             title: self.native(form, title=self.title(title))
@@ -219,6 +220,15 @@ class Subject:
                 except LossError:  # listed among what was not examined
                     continue
                 yield compare_exact(actual, truth, self.rows, dtype=dtype)
+
+
+def _most_probes(model: Document) -> int:
+    """Return how many probes a model gets: fewer of very many rules and classes."""
+    if model.outputs or not model.rules:
+        return MOST_PROBES
+    rules = cast("RuleBase", model).rules
+    numbers = sum(len(rule.when) + len(rule.probabilities or ()) for rule in rules)
+    return min(MOST_PROBES, max(1, _DEGREES_AND_SHARES // max(1, numbers)))
 
 
 def single_bounds(program: Program, values: FloatArray) -> FloatArray:

@@ -308,6 +308,7 @@ class _Judge:
             return self._proved("labels", text)
         slack = float(np.max(self._pair.allowed)) * (1 + (one.decides == "largest"))
         slack += one.label_slack + two.label_slack
+        slack *= 2  # sums of the search are rounded, too
         search = Search([one] if is_paired else [one, two], self._domain, slack)
         tied = 0
         for box in search.boxes():

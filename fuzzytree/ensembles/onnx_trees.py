@@ -21,7 +21,7 @@ from fuzzytree.ensembles.trees import (
     Tree,
     cuts_of_rounded,
 )
-from fuzzytree.errors import MissingExtraError, ReadError
+from fuzzytree.errors import MissingExtraError, ReadError, install_hint
 from fuzzytree.model import FloatArray
 
 if TYPE_CHECKING:
@@ -113,9 +113,8 @@ def _graph(content: bytes, name: str) -> onnx.GraphProto:
     try:
         import onnx
     except ImportError as error:
-        raise MissingExtraError(
-            "reading ONNX needs the package onnx: pip install 'fuzzytree-toolkit[onnx]'"
-        ) from error
+        text = f"{name}: reading ONNX needs {install_hint('onnx')}"
+        raise MissingExtraError(text) from error
     try:
         proto = onnx.load_from_string(content)
     except Exception as error:  # DecodeError of protobuf, which has no types

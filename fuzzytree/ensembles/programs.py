@@ -26,7 +26,7 @@ from fuzzytree.ensembles.boosters import (
 from fuzzytree.ensembles.onnx_trees import NotOnnxError, OnnxTrees, from_onnx
 from fuzzytree.ensembles.sklearn_trees import from_estimator, is_sklearn
 from fuzzytree.ensembles.trees import Ensemble, Rows, Tree
-from fuzzytree.errors import LossError, MissingExtraError, ReadError
+from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
 from fuzzytree.exporters import tree_tests
 from fuzzytree.files import read_bounded
 from fuzzytree.model import FloatArray, FuzzyTree, IntArray, stand_ins
@@ -111,7 +111,13 @@ def opened(source: object) -> Opened | None:
     if suffix in _OTHER_FILES:
         raise ReadError(f"{name}: {_OTHER_FILES[suffix]}")
     if suffix == ".skops":
-        return _of_estimator(_unpacked(read_bounded(source), name), name)
+        model = _unpacked(read_bounded(source), name)
+        try:
+            return _of_estimator(model, name)
+        except (AttributeError, IndexError, KeyError, TypeError) as error:
+            # Another type or another shape than scikit-learn gives an attribute.
+            kind = type(model).__name__
+            raise ReadError(f"{name}: holds no whole {kind}: {error}") from error
     if suffix == ".onnx":
         content = read_bounded(source)
         if _OWN_KEY in content or _TREES not in content:
@@ -238,9 +244,8 @@ def _unpacked(content: bytes, name: str) -> Any:
     try:
         import skops.io
     except ImportError as error:
-        raise MissingExtraError(
-            f"{name}: reading .skops needs skops: pip install skops"
-        ) from error
+        text = f"{name}: reading .skops needs {install_hint('skops')}"
+        raise MissingExtraError(text) from error
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = archive.infolist()

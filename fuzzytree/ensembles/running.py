@@ -48,7 +48,9 @@ class Pair:
         self.unit = max(one.unit, two.unit)
         sizes = np.maximum(one.sizes(), two.sizes())
         rounding = one.rounding() + two.rounding()
-        self.allowed: FloatArray = rounding + _ROUNDINGS * self.unit * sizes
+        # One rounding more than leaves may have, for that of the bound itself.
+        converted = (_ROUNDINGS + 1) * self.unit * sizes
+        self.allowed: FloatArray = rounding + converted
         self.takes_missing = one.takes_missing and two.takes_missing
         self.differing: dict[Question, Witness] = {}
         self.counts: dict[Question, int] = {}

@@ -287,3 +287,12 @@ def test_settings_of_models_of_ours_are_refused(tmp_path: Path) -> None:
     forest = RandomForestClassifier(2).fit(*IRIS)
     with pytest.raises(LossError, match="one other file or estimator, and not with 0"):
         ft.check(forest)
+
+
+def test_a_skops_file_whose_parts_are_no_trees_is_refused(tmp_path: Path) -> None:
+    model = RandomForestClassifier(2).fit(*IRIS)
+    model.estimators_ = [1, 2]
+    path = tmp_path / "bad.skops"
+    path.write_bytes(skops_file(model))
+    with pytest.raises(ReadError, match="holds no whole RandomForestClassifier"):
+        opened(path)
