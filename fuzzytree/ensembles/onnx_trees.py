@@ -68,6 +68,17 @@ def from_onnx(content: bytes, name: str) -> OnnxTrees:
             names the node.
         MissingExtraError: If onnx is not installed.
     """
+    try:
+        return _read(content, name)
+    except ReadError:
+        raise
+    except (IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
+        # What onnx and numpy raise of parts that do not fit each other.
+        raise ReadError(f"{name}: is no whole graph of trees: {error}") from error
+
+
+def _read(content: bytes, name: str) -> OnnxTrees:
+    """Read a graph whose parts fit each other."""
     graph = _graph(content, name)
     nodes = list(graph.node)
     ensembles = [node for node in nodes if node.op_type in _TREES]

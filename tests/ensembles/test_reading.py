@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import pickle
+import random
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -296,3 +297,28 @@ def test_a_skops_file_whose_parts_are_no_trees_is_refused(tmp_path: Path) -> Non
     path.write_bytes(skops_file(model))
     with pytest.raises(ReadError, match="holds no whole RandomForestClassifier"):
         opened(path)
+
+
+def test_broken_bytes_are_read_or_refused_in_a_sentence() -> None:
+    draw = random.Random(0)
+    good = [random_graph(0), random_graph(1, classes=3)]
+    whole = 0
+    refusals: list[str] = []
+    for _ in range(1500):
+        content = bytearray(draw.choice(good))
+        for _ in range(draw.choice([1, 2, 5])):
+            place = draw.randrange(len(content))
+            if draw.random() < 0.5:
+                content[place] = draw.randrange(256)
+            else:
+                del content[place : place + draw.randrange(1, 9)]
+        try:
+            from_onnx(bytes(content), "m.onnx")
+            whole += 1
+        except ReadError as error:
+            refusals.append(str(error))
+    assert whole
+    assert refusals
+    for text in refusals:
+        assert text.startswith("m.onnx: ")
+        assert "\n" not in text
