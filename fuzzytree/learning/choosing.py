@@ -30,6 +30,8 @@ _FEWEST = 20
 _ROWS = 4_000
 _CELLS = 250_000
 _MANY_CLASSES = 100
+_ONE_STYLE = 30  # classes; of more a node tests where their centres part
+_FOLDS_OF_MANY = 2  # of the five, that are held out
 _COST_OF_MANY = 2.0  # of a leaf, where there are too many classes to hold rows out
 _SLACK = 0.5  # in standard errors
 _PATIENCE = 2
@@ -106,7 +108,7 @@ def _styles(rows: TrainingRows, rules: SplitRules) -> list[Style]:
     classes = len(np.unique(rows.codes))
     if not has_combinations:
         return ["columns"]
-    if classes > _MANY_CLASSES:
+    if classes > _ONE_STYLE:
         return ["centres"]
     return ["columns", "mixed"] if classes < 3 else ["columns", "mixed", "centres"]
 
@@ -138,7 +140,8 @@ def folds_of_rows(rows: TrainingRows, seed: int) -> list[Fold]:
     order = order[np.argsort(rows.codes[order], kind="stable")]
     turn = np.cumsum(np.diff(owners[order], prepend=owners[order[0]]) != 0) % _FOLDS
     learnt = [np.sort(order[turn != k]) for k in range(_FOLDS)]
-    return [Fold(learnt[k], order[turn == k]) for k in range(_FOLDS)]
+    count = _FOLDS if classes <= _ONE_STYLE else _FOLDS_OF_MANY
+    return [Fold(learnt[k], order[turn == k]) for k in range(count)]
 
 
 def _copies(rows: TrainingRows) -> IntArray:
