@@ -86,6 +86,20 @@ def test_a_right_conversion_is_proved(name: str, tmp_path: Path) -> None:
         assert labels == {"PROVED"}
 
 
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", RIGHT)
+def test_no_score_of_many_rows_at_and_beside_cuts_differs(
+    name: str, tmp_path: Path
+) -> None:
+    model, (rows, target) = RIGHT[name]
+    model.fit(rows, target)
+    path = written(model, rows.shape[1], tmp_path / "m.onnx")
+    found = check(model, path, limit=20_000)
+    assert verdicts(found, "scores") == {"PROVED"}
+    assert all("other numbers" not in a.sentence for a in answers(found, "programs"))
+    assert "0,000 rows were run" in answers(found, "programs")[0].sentence
+
+
 def test_missing_values_go_elsewhere_in_the_simplest_tree(tmp_path: Path) -> None:
     model = DecisionTreeClassifier().fit([[0], [0], [1]], [0, 0, 1])
     found = check(model, written(model, 1, tmp_path / "m.onnx"))

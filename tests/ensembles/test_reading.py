@@ -205,6 +205,45 @@ def test_a_version_5_ensemble_is_read(tmp_path: Path) -> None:
     assert ft.check(path, path).ok
 
 
+def test_thresholds_and_weights_of_doubles_are_read(tmp_path: Path) -> None:
+    doubles = {
+        "nodes_values_as_tensor": [0.1, 0.0, 0.0],
+        "target_weights_as_tensor": [1 / 3, 2 / 3],
+    }
+    tensors: dict[str, Any] = {
+        name: helper.make_tensor(name, TensorProto.DOUBLE, [len(values)], values)
+        for name, values in doubles.items()
+    }
+    node = helper.make_node(
+        "TreeEnsembleRegressor",
+        ["X"],
+        ["scores"],
+        domain="ai.onnx.ml",
+        n_targets=1,
+        nodes_treeids=[0, 0, 0],
+        nodes_nodeids=[0, 1, 2],
+        nodes_featureids=[0, 0, 0],
+        nodes_modes=["BRANCH_LEQ", "LEAF", "LEAF"],
+        nodes_truenodeids=[1, 0, 0],
+        nodes_falsenodeids=[2, 0, 0],
+        target_treeids=[0, 0],
+        target_nodeids=[1, 2],
+        target_ids=[0, 0],
+        **tensors,
+    )
+    proto = onnx.load_from_string(
+        of_node(node, TensorProto.DOUBLE, 1, is_classifier=False)
+    )
+    proto.opset_import[1].version = 3
+    proto.graph.output[0].type.tensor_type.elem_type = TensorProto.FLOAT
+    content = proto.SerializeToString()
+    rows = np.array([[0.1], [np.nextafter(0.1, 1)], [float(np.float32(0.1))]])
+    ensemble = from_onnx(content, "m.onnx").ensemble
+    scores = ensemble.scores(rows)
+    assert scores.ravel().tolist() == [1 / 3, 2 / 3, 2 / 3]
+    np.testing.assert_allclose(run(content, rows)[0], scores, rtol=1e-7)
+
+
 def skops_file(model: Any) -> bytes:
     import skops.io
 
