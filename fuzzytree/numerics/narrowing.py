@@ -66,6 +66,9 @@ def losses(model: Document, dtype: Dtype) -> tuple[Loss, ...]:
 
 
 def _variable_losses(variable: Variable, model: Document) -> Iterator[Loss]:
+    if variable.missing is not None:
+        stand_in = ("stand-in of missing values", variable.missing)
+        yield from _number_losses(f"variable {variable.name!r}", [stand_in])
     for part in variable.parts:
         where = f"part {part.input!r} of {variable.name!r}"
         yield from _number_losses(

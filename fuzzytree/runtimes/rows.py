@@ -21,6 +21,7 @@ from fuzzytree.model import (
     Variable,
     stand_ins,
 )
+from fuzzytree.numerics import rounded
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -192,7 +193,8 @@ def plan_axes(
         for v in mixed
     )
     known = stand_ins(variables)
-    stand = np.array([[known.get(name, np.nan)] for name in inputs], kind)
+    numbers = [known.get(name, np.nan) for name in inputs]
+    stand: Reals = rounded(numbers, np.dtype(kind).type).reshape(-1, 1)
     limit = min(map(_chain_limit, chains), default=float(np.finfo(kind).max))
     stand_or_none = stand if known else None
     return Axes(line, len(inputs), tuple(steps), chains, kind, limit, stand_or_none)

@@ -38,6 +38,7 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.numerics.narrowing import rounded
+from fuzzytree.runtimes import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probes
 from fuzzytree.semantics.reference import evaluate
@@ -408,6 +409,24 @@ def far_rules() -> RuleBase:
     )
     rules = tuple(Rule((Proposition("z", (term.name,)),), "a") for term in terms)
     return RuleBase("far", ("a",), variables, rules)
+
+
+def test_a_stand_in_that_float32_cannot_hold_is_refused_or_its_end() -> None:
+    cut = 3.4e38
+    terms = (Term("low", Band(high=cut)), Term("high", Band(low=cut)))
+    force = Variable("force", terms, missing=6.8e38)
+    ends = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
+    node = Node("force", (cut,), (0, 1), ends)
+    leaves = (Leaf("soft"), Leaf("firm"))
+    tree = FuzzyTree("far", ("soft", "firm"), (force,), (node,), leaves)
+    with pytest.raises(LossError, match=r"'force': stand-in .* lies beyond float32"):
+        write_onnx(tree, dtype="float32")
+    rows = np.array([[np.nan, np.inf, 1.0]])
+    for name in ("native", "onnxruntime"):
+        with pytest.raises(LossError, match="beyond float32"):
+            find_runtime(f"{name} float32").load(tree)
+    run = find_runtime("native").load(tree)
+    assert run(rows).rule.tolist() == [2, 2, 1]
 
 
 def test_numbers_that_float32_cannot_hold_are_listed_and_refused() -> None:
