@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import msgspec
 import numpy as np
 
-from fuzzytree.ensembles.trees import SINGLE, Ensemble, Rows, Tree, cuts_of_rounded
+from fuzzytree.ensembles.trees import SINGLE, Ensemble, Rows, Tree
 from fuzzytree.errors import ReadError
 from fuzzytree.model import FloatArray, IntArray
+from fuzzytree.numerics import cuts_of_rounded
 
 if TYPE_CHECKING:
     from fuzzytree.ensembles.programs import Answers

@@ -19,10 +19,10 @@ from fuzzytree.ensembles.trees import (
     Ensemble,
     Rows,
     Tree,
-    cuts_of_rounded,
 )
 from fuzzytree.errors import MissingExtraError, ReadError, install_hint
 from fuzzytree.model import FloatArray
+from fuzzytree.numerics import cuts_of_rounded
 
 if TYPE_CHECKING:
     import onnx

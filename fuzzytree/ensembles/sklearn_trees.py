@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from fuzzytree.ensembles.trees import Ensemble, Tree, cuts_of_rounded
+from fuzzytree.ensembles.trees import Ensemble, Tree
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.model import FloatArray
+from fuzzytree.numerics import cuts_of_rounded
 
 _FORESTS = ("RandomForest", "ExtraTrees")
 _SINGLE_TREES = ("DecisionTree", "ExtraTree")

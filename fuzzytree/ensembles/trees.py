@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -20,42 +20,11 @@ from fuzzytree.model import BoolArray, FloatArray, IntArray
 MOST_NODES = 4_000_000
 _MOST_NUMBERS = 1 << 27  # of leaf vectors
 
-_BEYOND = 2.0**128  # where the floats of 32 bits would go on
-
 Rows = Literal["float32", "float64"]
 """The number type of rows."""
 
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """How much one rounding can change a number, relative to it."""
-
-
-def cuts_of_rounded(thresholds: FloatArray) -> FloatArray:
-    """Return the doubles `cut` for which `x <= cut` is `float32(x) <= threshold`.
-
-    With f the largest float of 32 bits that is not above the threshold, all doubles up
-    to the middle between f and the next float become f or less; the middle does if the
-    last bit of f is 0.
-
-    Example:
-        >>> float(cuts_of_rounded(np.array([0.5]))[0])
-        0.5000000298023224
-    """
-    below = floats_below(thresholds)
-    with np.errstate(over="ignore"):
-        above = np.nextafter(below, np.float32(np.inf))
-        low = np.clip(below.astype(np.float64), -_BEYOND, _BEYOND)
-        middle = low / 2 + np.clip(above.astype(np.float64), -_BEYOND, _BEYOND) / 2
-    is_even = below.view(np.uint32) % 2 == 0
-    cuts = np.where(is_even, middle, np.nextafter(middle, -np.inf))
-    return np.where(thresholds == np.inf, np.inf, cuts)
-
-
-def floats_below(numbers: FloatArray) -> Any:
-    """Return the largest float of 32 bits that is not above each number."""
-    with np.errstate(over="ignore"):
-        singles = np.asarray(numbers, np.float64).astype(np.float32)
-    too_high = singles.astype(np.float64) > numbers
-    return np.where(too_high, np.nextafter(singles, np.float32(-np.inf)), singles)
 
 
 @dataclass(frozen=True)

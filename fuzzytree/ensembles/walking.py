@@ -13,8 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fuzzytree.ensembles.trees import Rows, Tree, floats_below
+from fuzzytree.ensembles.trees import Rows, Tree
 from fuzzytree.model import FloatArray
+from fuzzytree.numerics import floats_below
 
 _LARGEST = {
     "float32": float(np.finfo(np.float32).max),

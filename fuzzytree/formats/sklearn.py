@@ -3,7 +3,7 @@
 Scikit-learn rounds every value to a float of 32 bits before it compares it with a
 threshold of 64: it goes left where `float32(x) <= threshold`. That is `x <= cut` for
 one double, the largest that is still rounded to a float that is not above the threshold
-(`exact_cut`). So our tree needs no rounding, and answers alike.
+(`fuzzytree.numerics.cuts_of_rounded`). So our tree needs no rounding, and answers alike.
 
 Each node has a direction for missing values. Our tree has a value for each column that
 stands for a missing one, and reads directions that one value takes (`_stand_ins`). A
@@ -47,8 +47,8 @@ from fuzzytree.model import (
     label_type_of,
     name_choice,
 )
+from fuzzytree.numerics import cuts_of_rounded
 
-_BEYOND = 2.0**128  # where the floats of 32 bits would go on
 _LARGEST = np.finfo(np.float64).max
 _SCALERS = ("StandardScaler", "MinMaxScaler", "MaxAbsScaler", "RobustScaler")
 _MISSING = 2.0**127  # the cut above which a value counts as missing
@@ -144,29 +144,6 @@ def from_sklearn(
         ),
         columns=named.columns,
     )
-
-
-def exact_cut(threshold: float) -> float:
-    """Return the double `cut` for which `x <= cut` is `float32(x) <= threshold`.
-
-    Rounding to the nearest float, and to the even one of two: with f the largest float
-    that is not above the threshold, all doubles up to the middle between f and the
-    next float become f or less; the middle itself does if f is even.
-
-    Example:
-        >>> cut = exact_cut(0.1)
-        >>> float(np.float32(cut)) <= 0.1 < float(np.float32(math.nextafter(cut, 1)))
-        True
-    """
-    with np.errstate(over="ignore"):
-        below = np.float32(threshold)
-        if float(below) > threshold:
-            below = np.nextafter(below, np.float32(-np.inf))
-        above = np.nextafter(below, np.float32(np.inf))
-    ends = (min(max(float(end), -_BEYOND), _BEYOND) for end in (below, above))
-    middle = sum(ends) / 2.0
-    is_even = int(below.view(np.uint32)) % 2 == 0
-    return middle if is_even else math.nextafter(middle, -math.inf)
 
 
 def _kinds(thing: object) -> list[str]:
@@ -265,10 +242,9 @@ class _Arrays(NamedTuple):
             left,
             tree.children_right.tolist(),
             tree.feature.tolist(),
-            [
-                exact_cut(threshold) if math.isfinite(threshold) else _MISSING
-                for threshold in tree.threshold.tolist()
-            ],
+            np.where(
+                np.isfinite(tree.threshold), cuts_of_rounded(tree.threshold), _MISSING
+            ).tolist(),
             tree.missing_go_to_left.astype(bool).tolist(),
             np.argmax(values, axis=1).tolist(),
             tree.n_node_samples.tolist(),

@@ -30,6 +30,8 @@ from .exact import exact_degree as exact_degree
 from .exact import outwards as outwards
 from .narrowing import RealArray as RealArray
 from .narrowing import RealKind as RealKind
+from .narrowing import cuts_of_rounded as cuts_of_rounded
+from .narrowing import floats_below as floats_below
 from .narrowing import losses as losses
 from .narrowing import rounded as rounded
 from .oracle import Decisions as Decisions

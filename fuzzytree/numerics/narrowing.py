@@ -28,6 +28,7 @@ RealKind = np.float64 | np.float32
 RealArray = npt.NDArray[np.float64] | npt.NDArray[np.float32]
 
 LARGEST = float(np.finfo(np.float32).max)
+_BEYOND = 2.0**128  # where the floats of 32 bits would go on
 SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
 
 
@@ -48,6 +49,35 @@ def rounded(
         least = np.copysign(np.float32(SMALLEST), single)
         single = np.where(single == 0, least, single).astype(np.float32)
     return single
+
+
+def cuts_of_rounded(thresholds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the doubles `cut` for which `x <= cut` is `float32(x) <= threshold`.
+
+    With f the largest float of 32 bits that is not above the threshold, all doubles up
+    to the middle between f and the next float become f or less; the middle does if the
+    last bit of f is 0.
+
+    Example:
+        >>> float(cuts_of_rounded(np.array([0.5]))[0])
+        0.5000000298023224
+    """
+    below = floats_below(thresholds)
+    with np.errstate(over="ignore"):
+        above = np.nextafter(below, np.float32(np.inf))
+        low = np.clip(below.astype(np.float64), -_BEYOND, _BEYOND)
+        middle = low / 2 + np.clip(above.astype(np.float64), -_BEYOND, _BEYOND) / 2
+    is_even = below.view(np.uint32) % 2 == 0
+    cuts = np.where(is_even, middle, np.nextafter(middle, -np.inf))
+    return np.where(thresholds == np.inf, np.inf, cuts)
+
+
+def floats_below(numbers: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+    """Return the largest float of 32 bits that is not above each number."""
+    with np.errstate(over="ignore"):
+        singles = np.asarray(numbers, np.float64).astype(np.float32)
+    too_high = singles.astype(np.float64) > numbers
+    return np.where(too_high, np.nextafter(singles, np.float32(-np.inf)), singles)
 
 
 def losses(model: Document, dtype: Dtype) -> tuple[Loss, ...]:

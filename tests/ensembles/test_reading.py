@@ -28,8 +28,8 @@ from sklearn.tree import DecisionTreeClassifier
 import fuzzytree as ft
 from fuzzytree.ensembles.onnx_trees import from_onnx
 from fuzzytree.ensembles.programs import opened
-from fuzzytree.ensembles.trees import cuts_of_rounded
 from fuzzytree.errors import LossError, ReadError
+from fuzzytree.numerics import cuts_of_rounded
 from tests.ensembles.graphs import MODES, of_node, random_graph, run, written
 
 IRIS = load_iris(return_X_y=True)
