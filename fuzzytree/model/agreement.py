@@ -268,9 +268,7 @@ class Agreement(Result, msgspec.Struct, frozen=True):
 
     def to_json(self) -> str:
         """Return the same facts for programs, as indented JSON."""
-        head = {"format": self.FORMAT, "version": version(), "ok": self.ok}
-        raw = msgspec.json.encode({**head, **msgspec.to_builtins(self)})
-        return msgspec.json.format(raw, indent=2).decode()
+        return _as_json(self)
 
     def raise_if_not_ok(self) -> None:
         """Raise DisagreementError, naming what disagrees, unless all agrees."""
@@ -278,6 +276,13 @@ class Agreement(Result, msgspec.Struct, frozen=True):
             lines = [*map(_fault, self.wrong)]
             lines += [f"  {text}" for one in self.wrong for text in one.detail[:1]]
             raise DisagreementError("\n".join(lines))
+
+
+def _as_json(result: Agreement | TreeAgreement) -> str:
+    """Return a result as indented JSON, with its format and verdict first."""
+    head = {"format": result.FORMAT, "version": version(), "ok": result.ok}
+    raw = msgspec.json.encode({**head, **msgspec.to_builtins(result)})
+    return msgspec.json.format(raw, indent=2).decode()
 
 
 def _fault(one: Comparison | Certified) -> str:
@@ -362,9 +367,7 @@ class TreeAgreement(Result, msgspec.Struct, frozen=True):
 
     def to_json(self) -> str:
         """Return the same facts for programs, as indented JSON."""
-        head = {"format": self.FORMAT, "version": version(), "ok": self.ok}
-        raw = msgspec.json.encode({**head, **msgspec.to_builtins(self)})
-        return msgspec.json.format(raw, indent=2).decode()
+        return _as_json(self)
 
     def raise_if_not_ok(self) -> None:
         """Raise DisagreementError, naming what differs, unless nothing does."""
