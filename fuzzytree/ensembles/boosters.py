@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import msgspec
 import numpy as np
 
-from fuzzytree.ensembles.trees import SINGLE, Ensemble, Rows, Tree
+from fuzzytree.ensembles.trees import (
+    MOST_NUMBERS,
+    MOST_SCORES,
+    SINGLE,
+    Ensemble,
+    Rows,
+    Tree,
+)
 from fuzzytree.errors import ReadError
 from fuzzytree.model import FloatArray, IntArray
 from fuzzytree.numerics import cuts_of_rounded
@@ -21,8 +28,6 @@ if TYPE_CHECKING:
     from fuzzytree.ensembles.programs import Answers
 
 _MOST_COLUMNS = 1_000_000
-_MOST_SCORES = 10_000
-_MOST_NUMBERS = 1 << 27  # in the leaves of all trees
 _SINGLE_SLACK, _DOUBLE_SLACK = 2.0**-20, 2.0**-49  # of a probability rounded onto .5
 
 # Objectives whose prediction is the sum.
@@ -359,9 +364,9 @@ def _check_within(numbers: IntArray, size: int, what: str, name: str) -> None:
 
 
 def _check_sizes(name: str, leaves: int, count: int, width: int) -> None:
-    if not (0 < width <= _MOST_COLUMNS and count <= _MOST_SCORES):
+    if not (0 < width <= _MOST_COLUMNS and count <= MOST_SCORES):
         _refuse(name, f"a model of {width:,} columns and {count:,} scores")
-    if leaves * count > _MOST_NUMBERS:
+    if leaves * count > MOST_NUMBERS:
         _refuse(name, f"a model of {leaves:,} leaves with {count:,} scores each")
 
 

@@ -15,6 +15,8 @@ import numpy as np
 
 from fuzzytree.ensembles.trees import (
     DOUBLE,
+    MOST_NUMBERS,
+    MOST_SCORES,
     SINGLE,
     Ensemble,
     Rows,
@@ -357,7 +359,7 @@ def _vectors(
     leaves: Any, scores: Any, weights: Any, rows: int, count: int, name: str
 ) -> FloatArray:
     """Return what each leaf adds, shape (rows, count)."""
-    if not 0 < count <= 10_000 or rows * count > 1 << 27:
+    if not 0 < count <= MOST_SCORES or rows * count > MOST_NUMBERS:
         raise ReadError(f"{name}: {count} scores of {rows} leaves are too many")
     if len(scores) and not 0 <= scores.min() <= scores.max() < count:
         raise ReadError(f"{name}: a leaf adds to a score that is not there")

@@ -18,7 +18,8 @@ from fuzzytree.errors import ReadError
 from fuzzytree.model import BoolArray, FloatArray, IntArray
 
 MOST_NODES = 4_000_000
-_MOST_NUMBERS = 1 << 27  # of leaf vectors
+MOST_SCORES = 10_000
+MOST_NUMBERS = 1 << 27  # of leaf vectors
 
 Rows = Literal["float32", "float64"]
 """The number type of rows."""
@@ -67,7 +68,7 @@ class Tree:
                 comes back to its start.
         """
         count, leaves = len(columns), len(values)
-        if count > MOST_NODES or values.size > _MOST_NUMBERS:
+        if count > MOST_NODES or values.size > MOST_NUMBERS:
             raise ReadError(
                 f"{name}: a tree has {count:,} nodes; at most {MOST_NODES:,} are read"
             )

@@ -3,7 +3,7 @@
 Scikit-learn rounds every value to a float of 32 bits before it compares it with a
 threshold of 64: it goes left where `float32(x) <= threshold`. That is `x <= cut` for
 one double, the largest that is still rounded to a float that is not above the threshold
-(`fuzzytree.numerics.cuts_of_rounded`). So our tree needs no rounding, and answers alike.
+(`numerics.cuts_of_rounded`). So our tree needs no rounding, and answers alike.
 
 Each node has a direction for missing values. Our tree has a value for each column that
 stands for a missing one, and reads directions that one value takes (`_stand_ins`). A
