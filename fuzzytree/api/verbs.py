@@ -427,7 +427,8 @@ def check(
     """
     check_arguments(check, options, CheckArguments)
     chosen = with_arguments(settings or CheckSettings(), options)
-    trees = check_trees(model, others, data, as_names(names), runtimes, chosen.limit)
+    names = as_names(names)
+    trees = check_trees(model, others, data, names, runtimes, chosen.limit)
     if trees is not None:
         return trees
     first = checking.as_model(model, allow_loss=allow_loss)
@@ -435,7 +436,6 @@ def check(
         os.fspath(other) if isinstance(other, str | os.PathLike) else f"file {number}"
         for number, other in enumerate(others, 1)
     ]
-    names = as_names(names)
     titles = [*names, *titles[len(names) :]][: len(others)]
     rest = [
         _program(other, chosen.run_code) or opened(other, allow_loss=allow_loss)

@@ -196,15 +196,16 @@ class _Judge:
         leaves: list[LeafPair] = []
         trees = zip(self._one.trees, self._two.trees, strict=True)
         for number, (left, right) in enumerate(trees, 1):
-            walk = Walk(left, right, self._domain)
             if is_same_shape(left, right, self._domain):
                 near = self._pair.is_near(left.values, right.values)
                 leaves = [(leaf, leaf, None) for leaf in range(len(near))]
                 if not near.all():
                     leaf = int(np.argmin(near))
+                    walk = Walk(left, right, self._domain)
                     boxes = (pair.box for pair in walk.pairs() if pair.first == leaf)
                     apart += [(number, box) for box in boxes][:1]
                 continue
+            walk = Walk(left, right, self._domain)
             leaves, wrong = [], []
             partners: tuple[dict[int, int], dict[int, int]] = {}, {}
             one_to_one = True

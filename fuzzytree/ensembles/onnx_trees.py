@@ -48,7 +48,7 @@ class OnnxTrees(NamedTuple):
 
     Attributes:
         ensemble: What its trees compute.
-        content: The file, without what is not understood.
+        content: The file.
         entrance: The name of its input.
         label, output: The outputs with labels and with numbers, if there are such.
         unread: The nodes after the trees that are not part of the ensemble.

@@ -216,8 +216,8 @@ def linked(ensemble: Ensemble, scores: FloatArray, width: int) -> FloatArray:
     """Return outputs of scores; of two classes with one score both probabilities."""
     if ensemble.link == "softmax":
         powers = np.exp(scores - scores.max(axis=1, keepdims=True))
-        linked: FloatArray = powers / powers.sum(axis=1, keepdims=True)
-        return linked
+        shares: FloatArray = powers / powers.sum(axis=1, keepdims=True)
+        return shares
     with np.errstate(over="ignore"):
         numbers = 1 / (1 + np.exp(-scores)) if ensemble.link == "logistic" else scores
     if numbers.shape[1] == 1 and width == 2:

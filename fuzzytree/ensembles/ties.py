@@ -49,7 +49,7 @@ class Side:
         self.is_small = (
             ensemble.leaf_count * len(columns) <= _MOST_BOUNDS
             and signs.shape[1] <= _MOST_PAIRS
-            and not (domain.is_infinite and any_at_end(ensemble))
+            and not (domain.is_infinite and _is_at_end(ensemble))
         )
         if not self.is_small:
             return
@@ -75,7 +75,7 @@ class Side:
         return able
 
 
-def any_at_end(ensemble: Ensemble) -> bool:
+def _is_at_end(ensemble: Ensemble) -> bool:
     """Return whether a cut is minus infinity, which parts infinite rows alone."""
     return any(bool((tree.cuts == -np.inf).any()) for tree in ensemble.trees)
 

@@ -22,7 +22,7 @@ def tree_lines(agreement: TreeAgreement, *, is_verbose: bool = False) -> Iterato
     verdict = (
         f"{wrong} of {len(agreement.answers)} answers differ"
         if wrong
-        else ("no answer differs")
+        else "no answer differs"
     )
     yield f"{agreement.first} and {agreement.second}: {verdict}"
     both = zip(
@@ -87,6 +87,5 @@ def _row_text(
     shown = cells if is_verbose else cells[:_MOST_VALUES]
     more = len(cells) - len(shown)
     rest = f"{more} more are not 0" if more else "all others are 0"
-    rest = rest if cells else "all values are 0"
     is_all = len(cells) == len(row) and not more
     return ", ".join(shown if is_all else [*shown, rest])
