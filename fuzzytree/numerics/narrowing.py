@@ -76,8 +76,8 @@ def floats_below(numbers: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
     """Return the largest float of 32 bits that is not above each number."""
     with np.errstate(over="ignore"):
         singles = np.asarray(numbers, np.float64).astype(np.float32)
-    too_high = singles.astype(np.float64) > numbers
-    return np.where(too_high, np.nextafter(singles, np.float32(-np.inf)), singles)
+        lower = np.nextafter(singles, np.float32(-np.inf))
+    return np.where(singles.astype(np.float64) > numbers, lower, singles)
 
 
 def losses(model: Document, dtype: Dtype) -> tuple[Loss, ...]:
